@@ -4,7 +4,7 @@ BIN := .venv/bin
 
 .DEFAULT_GOAL := run
 CATALOGUE := $(filter-out scale,$(notdir $(wildcard configs/*)))
-.PHONY: run catalogue test test-slow lint bench mutation docs torture fuzz sbom scale lowest clean help set-up-run set-up-dev set-up-browser \
+.PHONY: run catalogue test test-slow cluster lint bench mutation docs torture fuzz sbom scale lowest clean help set-up-run set-up-dev set-up-browser \
 	set-up-docs set-up-lowest
 
 run: set-up-run  ## run the default experiments and write results/index.html (this is what plain `make` does)
@@ -13,8 +13,11 @@ run: set-up-run  ## run the default experiments and write results/index.html (th
 test: set-up-dev  ## run the tests, without those marked slow
 	$(BIN)/pytest -n 2 --dist worksteal --durations 10 -m "not slow"
 
-test-slow: set-up-dev set-up-browser  ## run the tests marked slow
-	$(BIN)/pytest -n 2 --dist worksteal --durations 10 -m slow
+test-slow: set-up-dev set-up-browser  ## run the tests marked slow, but for those of `cluster` and `torture`
+	$(BIN)/pytest -n 2 --dist worksteal --durations 10 -m slow --ignore tests/cluster --ignore tests/torture
+
+cluster: set-up-dev  ## run a large sweep on a SLURM of this machine, and kill what runs there, 3 minutes
+	$(BIN)/pytest -m slow tests/cluster
 
 lint: set-up-dev  ## check style, types, layers, workflow and generated files
 	$(BIN)/ruff check .
@@ -37,7 +40,8 @@ docs: set-up-run set-up-docs  ## build the documentation site, results/docs/inde
 	@[ ! -f results/index.html ] || $(BIN)/vibsim report
 	@echo "documentation: results/docs/index.html"
 
-torture: set-up-dev  ## kill, damage, starve and edit small experiments at random, for MINUTES=5; OPTIONS="--seed 1 --case 7" repeats a case
+torture: set-up-dev  ## kill, damage, starve and edit small experiments: one case of each kind, then at random for MINUTES=5; OPTIONS="--seed 1 --case 7" repeats a case
+	$(if $(OPTIONS),,$(BIN)/pytest -n 2 --dist worksteal -m slow tests/torture)
 	PYTHONPATH=tests $(BIN)/python -m torture --minutes $(or $(MINUTES),5) $(OPTIONS)
 
 fuzz: set-up-run  ## give the readers of users' files what a coverage-guided fuzzer finds, for MINUTES=5

@@ -10,10 +10,13 @@ import math
 from collections.abc import Iterator
 from typing import Any
 
+import pytest
+
 from vibsim import Verdict
 from vibsim.analysis import analyse_records, verdicts
 from vibsim.core.record import Record
 from vibsim.experiment import Experiment
+from vibsim.experiment.cost import PLAIN_MEMBER_STEPS
 from vibsim.simulation import simulate_record
 
 PART = 0.25
@@ -79,12 +82,21 @@ def _orders(claim: Any, verdict: Verdict, order: float) -> Iterator[tuple[str, f
         yield "order", float(found.pop())
 
 
-def survivors(experiment: Experiment) -> list[str]:
+def simulated(experiment: Experiment) -> dict[int, Record]:
+    """Return all levels, which share their kernels here: what a level alone must pay back, all of them may."""
+    work = experiment.members * sum(map(experiment.steps, experiment.levels))
+    with pytest.MonkeyPatch.context() as patch:
+        if work > PLAIN_MEMBER_STEPS:
+            patch.setattr("vibsim.engine.trajectories.PLAIN_MEMBER_STEPS", 0)
+            patch.setattr("vibsim.simulation.adaptive.PLAIN_MEMBER_STEPS", 0)
+        return {level: simulate_record(experiment, level) for level in experiment.levels}
+
+
+def survivors(experiment: Experiment, levels: dict[int, Record]) -> list[str]:
     """Return the claims of an experiment that say the same with another number, and which number it is."""
     claims = tuple(c for c in experiment.checks if c.kind == "claim" and numbers_of(c))
     if not claims:
         return []
-    levels = {level: simulate_record(experiment, level) for level in experiment.levels}
     before = {v.id: v for v in judged(experiment, claims, levels)}
     added, of = [], {}
     for check in claims:

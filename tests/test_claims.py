@@ -1,13 +1,17 @@
-"""No shipped claim is empty: with another number its verdict turns."""
+"""No shipped claim is empty: with another number its verdict turns. And every figure that is asked for is drawn."""
 
 from __future__ import annotations
 
 from pathlib import Path
 
 import pytest
-from claim_mutants import survivors
+from claim_mutants import simulated, survivors
 
+from vibsim.analysis import analyse_records, summarise, verdicts
 from vibsim.experiment import Experiment
+from vibsim.report import choice, style
+from vibsim.report.figures import of_source
+from vibsim.report.page import player
 
 CONFIGS = Path(__file__).parents[1] / "configs"
 PATHS = {
@@ -19,8 +23,22 @@ PATHS = {
 
 @pytest.mark.slow
 @pytest.mark.parametrize("name", PATHS)
-def test_every_claim_turns_with_its_number(name: str) -> None:
-    assert survivors(Experiment.from_yaml(PATHS[name])) == []
+def test_every_claim_turns_with_its_number_and_every_figure_is_drawn(name: str) -> None:
+    experiment = Experiment.from_yaml(PATHS[name])
+    levels = simulated(experiment)
+    assert survivors(experiment, levels) == []
+    if not experiment.figures:
+        return
+    record = analyse_records(experiment, levels)
+    lead = choice.find_lead(
+        experiment, record, summarise(experiment, verdicts(experiment, record), record)
+    )
+    with style.applied():
+        found = of_source.pictures(experiment, record, lead)
+    has_player = bool(player.element(experiment, record))
+    assert of_source.undrawn(found, has_player=has_player) == []
+    names = [picture.name for _, pictures in found for picture in pictures]
+    assert len(names) == len(set(names))
 
 
 CONTENT = {
@@ -49,4 +67,5 @@ CONTENT = {
 )
 def test_an_empty_claim_is_found(that: dict[str, object], holds: bool, empty: int) -> None:
     claim = {"id": "it", "claim": "so it is", "that": that, "holds": holds, "note": "or is it"}
-    assert len(survivors(Experiment.from_dict({**CONTENT, "checks": [claim]}))) == empty
+    experiment = Experiment.from_dict({**CONTENT, "checks": [claim]})
+    assert len(survivors(experiment, simulated(experiment))) == empty

@@ -14,7 +14,7 @@ from tempfile import TemporaryDirectory
 import numpy as np
 import pytest
 from judged import ORDERS, Finding, datasets_of, experiment_of, findings
-from synthetic import FAMILIES, TOLERANCE, groups
+from synthetic import COUNTS, FAMILIES, TOLERANCE, groups
 
 from vibsim import VibsimError, analyse
 
@@ -22,9 +22,11 @@ HELD_OUT = 2
 TUNED = (1, 3, 4)
 SAMPLE, REST = range(14), range(14, 42)
 """Groups of ladders: one of each number of levels (`synthetic.COUNTS`), and the others of a seed."""
-HIDDEN_MOST = {(HELD_OUT, SAMPLE): 6, (HELD_OUT, REST): 15, (TUNED[0], SAMPLE): 7}
-"""Ladders in which a second power of more than a tenth may go unseen, 9 in 1000: the data do not show it, or noise is
-predicted so large that levels which do are not read."""
+MANY_LEVELS = 8
+"""Groups of more levels take two thirds of the time; one of each number is judged, in `SAMPLE`."""
+HIDDEN_MOST = {(HELD_OUT, SAMPLE): 6, (HELD_OUT, REST): 3, (TUNED[0], SAMPLE): 1}
+"""Ladders in which a second power of more than a tenth may go unseen: the data do not show it, or, of more than eight
+levels, noise is predicted so large that levels which do are not read."""
 OPEN_BESIDE = 0.034
 """Of the orders that are excluded by one that passes, so many may be left open.
 
@@ -48,11 +50,15 @@ WIDTH = 0.1
 
 
 def judged(
-    seed: int, numbers: range, folder: Path, orders: tuple[float, ...] = ORDERS
+    seed: int,
+    numbers: range,
+    folder: Path,
+    orders: tuple[float, ...] = ORDERS,
+    most_levels: int = max(COUNTS),
 ) -> list[Finding]:
     found = []
     for number, group in enumerate(groups(seed)):
-        if number in numbers:
+        if number in numbers and len(group.levels) <= most_levels:
             found += findings(group, folder, orders)
             names = {id(ladder): f"{seed}.{number}.{i}" for i, ladder in enumerate(group.ladders)}
             NAMES.update(names)
@@ -139,8 +145,7 @@ def check(found: list[Finding], seed: int, numbers: range) -> None:
     decidable = [one for one in right if one.ladder.decidable]
     left = [one for one in decidable if one.status == "INCONCLUSIVE"]
     assert len(left) <= NEEDLESS * len(decidable), Counter(one.reason for one in left)
-    intervals = stated(found)
-    assert np.mean([covered(one) for one in intervals]) >= COVERS - margin(len(intervals))
+    assert np.mean([covered(one) for one in stated(found)]) >= COVERS
 
 
 @pytest.mark.slow
@@ -209,8 +214,8 @@ def test_a_ladder_is_made_of_its_seed_alone() -> None:
 def test_the_rest_and_a_tuned_seed_are_judged_rightly(
     seed: int, numbers: range, tmp_path: Path
 ) -> None:
-    """By the orders that nine of ten ladders have; the other five are asked for above."""
-    check(judged(seed, numbers, tmp_path, (1.0, 2.0, 3.0, 4.0)), seed, numbers)
+    """By the orders that nine of ten ladders have; the other five, and many levels, are asked for above."""
+    check(judged(seed, numbers, tmp_path, (1.0, 2.0, 3.0, 4.0), MANY_LEVELS), seed, numbers)
 
 
 @pytest.mark.parametrize("name", ["v", "u_max", "omega_dt", "first_peak"])

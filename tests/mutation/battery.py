@@ -1,6 +1,7 @@
 """Small experiments of every kind, and what their verdicts and a plain ratio of differences say.
 
-Run as a program it prints, as JSON, what it found with the package that Python imports.
+Run as a program it prints, as JSON, what it found with the package that Python imports, of the experiments that are
+named, or of all.
 """
 
 from __future__ import annotations
@@ -303,7 +304,7 @@ def _plain(experiment: Any, found: Any) -> dict[str, bool]:
 
 if __name__ == "__main__":
     report: dict[str, Any] = {}
-    for experiment_name in (*EXPERIMENTS, *POLYNOMIALS):
+    for experiment_name in sys.argv[1:] or (*EXPERIMENTS, *POLYNOMIALS):
         try:
             report[experiment_name] = run(experiment_name)
         except Exception as error:  # a fault may do anything

@@ -67,12 +67,12 @@ def seeded(fault: Fault, folder: Path) -> None:
     file.write_text(text.replace(fault.right, fault.wrong))
 
 
-def battery(folder: Path) -> Report:
-    """Run the battery with the package in `folder`."""
+def battery(folder: Path, *names: str) -> Report:
+    """Run the battery, or some of its experiments, with the package in `folder`."""
     path = {"PYTHONPATH": str(folder), "PYTHONDONTWRITEBYTECODE": "1"}
     try:
         done = subprocess.run(
-            [sys.executable, str(HERE / "battery.py")],
+            [sys.executable, str(HERE / "battery.py"), *names],
             env={**os.environ, **path},
             cwd=folder,
             capture_output=True,
@@ -112,12 +112,12 @@ def seen_plainly(before: Report, after: Report) -> bool:
     )
 
 
-def outcome(fault: Fault, before: Report) -> Outcome:
-    """Seed a fault, and run the battery with it."""
+def outcome(fault: Fault, before: Report, *names: str) -> Outcome:
+    """Seed a fault, and run the battery, or some of its experiments, with it."""
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
         seeded(fault, folder)
-        after = battery(folder)
+        after = battery(folder, *names)
     others = {name: report for name, report in after.items() if name not in POLYNOMIALS}
     return Outcome(fault, noticed(before, others), seen_plainly(before, after), lost(before, after))
 

@@ -91,7 +91,7 @@ def test_without_a_sweep_there_is_no_list():
 @pytest.mark.slow
 def test_many_rows_are_not_written_one_by_one(tmp_path):
     small = samples.record(samples.experiment(sweep=SWEEP))
-    count = 60_000
+    count = 20_000
     place = np.arange(count) % 6
 
     def repeated(variable):

@@ -55,15 +55,6 @@ def drawn(exp: Experiment) -> tuple[list, list[str]]:
     return found, of_source.undrawn(found, has_player=has_player)
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("name", sorted({row[2] for row in LISTED}))
-def test_every_experiment_shows_its_figures(name: str) -> None:
-    found, undrawn = drawn(Experiment.from_yaml(CONFIGS / f"{name}.yaml"))
-    assert undrawn == []
-    names = [picture.name for _, pictures in found for picture in pictures]
-    assert len(names) == len(set(names))
-
-
 SPRING = {"model": {"kind": "spring", "w": 2.0}, "initial": {"u": 1.0}, "time": {"end": 10.0}}
 
 
