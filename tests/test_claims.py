@@ -33,6 +33,7 @@ CONTENT = {
 }
 
 
+@pytest.mark.usefixtures("without_series")
 @pytest.mark.parametrize(
     ("that", "holds", "empty"),
     [
