@@ -5,8 +5,11 @@ from __future__ import annotations
 import gc
 import os
 import sys
+from functools import cache
 
 import pytest
+
+from vibsim.cli import arguments
 
 # Without compiled modules beside the sources every worker rewrites the assertions of 200 files, and every job of a
 # workflow compiles 300 modules: 20 s and 0.5 s. Copies of the package that tests change are in folders of their own.
@@ -26,6 +29,12 @@ def pytest_collection_finish() -> None:
     gc.collect()
     gc.freeze()
     gc.set_threshold(50_000, 20, 1000)
+
+
+@pytest.fixture(scope="session", autouse=True)
+def one_parser() -> None:
+    """Make the parser of the command line once: it takes 8 ms, and no command changes it."""
+    arguments.parser = cache(arguments.parser)
 
 
 @pytest.fixture

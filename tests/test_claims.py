@@ -51,6 +51,7 @@ CONTENT = {
 }
 
 
+@pytest.mark.usefixtures("without_series")
 @pytest.mark.parametrize(
     ("that", "holds", "empty"),
     [

@@ -5,6 +5,8 @@ import pytest
 
 from vibsim import Experiment, analyse, simulate, verdicts
 
+pytestmark = pytest.mark.usefixtures("without_series")
+
 DRIVEN = {
     "title": "t",
     "model": {"kind": "circuit", "L": 0.5, "R": 0.3, "C": 0.8, "voltage": "2*sin(1.7*t)"},
@@ -22,6 +24,7 @@ def run(**changes):
     return experiment, levels, analyse(experiment, list(levels.values()))
 
 
+@pytest.mark.usefixtures("with_series")
 def test_what_follows_from_the_exact_states_is_known_as_well():
     checks = [{"converges": q, "order": "scheme"} for q in QUANTITIES]
     checks += [
@@ -39,6 +42,7 @@ def test_what_follows_from_the_exact_states_is_known_as_well():
     assert np.all(convergence["energy_budget_exact"].values == 0.0)
 
 
+@pytest.mark.usefixtures("with_series")
 def test_the_work_of_forces_is_that_of_a_fine_quadrature():
     """Simpson's rule over the exact motion at many times."""
     _, levels, _ = run()
@@ -56,6 +60,7 @@ def test_the_work_of_forces_is_that_of_a_fine_quadrature():
     assert (finest["dissipated_energy"][0, 0], finest["work_done"][0, 0]) == (0.0, 0.0)
 
 
+@pytest.mark.usefixtures("with_series")
 def test_a_wrong_power_does_not_pass():
     """Half of the damping's power is missing from the budget: it converges, but not to 0."""
     experiment, levels, _ = run(checks=[{"converges": "energy_budget", "order": "scheme"}])
@@ -97,6 +102,7 @@ def test_terms_that_vanish_are_no_part_of_the_equation():
     assert not alone.model.definition.conservative
 
 
+@pytest.mark.usefixtures("with_series")
 def test_the_budget_is_known_no_better_than_the_energy():
     """Its own size is an error, relative to which nothing is round-off."""
     _, levels, convergence = run(checks=[{"converges": "energy_budget", "order": "scheme"}])

@@ -89,7 +89,7 @@ def test_the_solution_that_is_printed_is_the_discrete_one(
     np.testing.assert_allclose(growth**n * (begin * np.cos(n * th) + swing), wanted, atol=1e-7)
 
 
-@pytest.mark.parametrize("kind", thinned(FIXED_STEP, 2))
+@pytest.mark.parametrize("kind", thinned(FIXED_STEP, 5))
 def test_the_printed_recurrence_is_that_of_the_scheme(kind: str, capsys: Capture) -> None:
     found = rows([kind], capsys)
     formula = re.split(r" (?:\(\d/\d\) )?\[", found["without v"])[0]

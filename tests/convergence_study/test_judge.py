@@ -351,7 +351,7 @@ def test_bounds_hold_where_rounding_in_single_precision_adds_up() -> None:
 def test_stated_noise_is_that_of_all_levels(points: int) -> None:
     """Many steps of first order, each smaller than the noise of two levels, are no noise."""
     rng = np.random.default_rng(20)
-    h = 1.0 / np.arange(10.0, 21.0)
+    h = np.linspace(0.1, 0.07, 7)
     drifting = [np.full(points, 1.0 + x) for x in h]
     assert judge(h, drifting, order=2, noise=0.0025).reason != "exact"
     noisy = [1.0 + rng.normal(scale=0.0025, size=points) for _ in h]
@@ -513,7 +513,7 @@ def compound(n: int) -> float:
 ERF = 0.5 * math.sqrt(math.pi) * math.erf(1.0)
 
 
-@pytest.mark.parametrize("count", thinned(range(4, 13), 2))
+@pytest.mark.parametrize("count", thinned(range(4, 13), 4))
 @pytest.mark.parametrize("order", [None, 2, 4, 1])
 def test_more_levels_of_a_number_make_no_worse_bound(order: int | None, count: int) -> None:
     rules = {2: midpoint, 4: simpson, 1: compound}

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from itertools import product
 from typing import Any
 
 import numpy as np
@@ -401,11 +402,12 @@ def test_masked_cells_are_not_advised_to_be_left_out_with_all_levels() -> None:
     assert "leave these levels out" in judge(H[:3], [math.nan] * 3).advice
 
 
-@pytest.mark.parametrize("shape", [np.ones(1), np.linspace(0.5, 1.0, 6)])
-@pytest.mark.parametrize("known", [False, True])
-@pytest.mark.parametrize("count", [5, 6])
+@pytest.mark.parametrize(
+    ("count", "known", "shape"),
+    thinned(product([5, 6], [False, True], [np.ones(1), np.linspace(0.5, 1.0, 6)]), 3),
+)
 def test_a_finest_level_that_contradicts_the_others_is_not_set_aside(
-    shape: Any, known: bool, count: int
+    count: int, known: bool, shape: Any
 ) -> None:
     """The last run stopped a step early, say: an order of the others is no verdict on all."""
     h, off = [0.1 / 2**k for k in range(count)], np.array([[1e-2], [1.0], [-1.0]])

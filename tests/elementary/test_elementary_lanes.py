@@ -63,7 +63,7 @@ def same(a, b):
 
 
 @pytest.mark.parametrize("count", [1_000, pytest.param(20_000, marks=pytest.mark.slow)])
-@pytest.mark.parametrize("name", thinned(ELEMENTARY, 2))
+@pytest.mark.parametrize("name", thinned(ELEMENTARY, 3))
 def test_fast_and_full_plain_and_compiled(name, count):
     columns = arguments(name, count)
     function = ELEMENTARY[name]

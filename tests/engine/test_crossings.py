@@ -471,7 +471,8 @@ def test_bounces_without_end_between_two_bodies_break_the_calculation_down():
     heavy |= {"events.2.falling": "y - x - 0.1"}
     heavy |= {"events.2.then.vx": "(vx + vy)/2 - 0.25*(vx - vy)"}
     heavy |= {"events.2.then.vy": "(vx + vy)/2 + 0.25*(vx - vy)"}
-    way = go(system(("x", "y"), heavy, ()), "rk4", {}, (0.5, 1.0, 0.0, 0.0), 4.0, 128)
+    start = 0.5, 1.0, 0.0, 0.0
+    way = go(system(("x", "y"), heavy, ()), "rk4", {}, start, 4.0, 128, lane="scalar")
     assert np.isnan(way.states[:, 0, -1]).all()
     sound = way.states[:, 0, : int(np.argmax(np.isnan(way.states[0, 0])))]
     assert sound[0].min() > -1e-12

@@ -103,7 +103,7 @@ def errors(model, kind, parameters, initial, end, reference, levels, **more):
     return np.array(found)
 
 
-CASES = thinned(product(FIXED_STEP, ("linear", "yielding", "driven")), 2)
+CASES = thinned(product(FIXED_STEP, ("linear", "yielding", "driven")), 4)
 
 
 def located(kind, name, levels, **more):

@@ -3,11 +3,15 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Callable
 from types import SimpleNamespace
 from typing import Any
 
+import pytest
+
 from vibsim import experiment as spec
-from vibsim.analysis import analyse_records, summarise, verdicts
+from vibsim.analysis import analyse_records, compare_levels, summarise, verdicts
+from vibsim.comparison import best_values
 from vibsim.core.record import Record
 from vibsim.experiment import canonical, storage
 from vibsim.report import choice, style
@@ -33,13 +37,35 @@ def experiment(*, name: str = "theta", collection: str = "pendulum_lab", **chang
 
 RECORDS: dict[str, Record] = {}
 """What was found of experiments: many tests look at the same ones. No test can change the arrays."""
+SHARED: dict[str, Any] = {}
+"""Levels, and tables of the analysis, of experiments but for their checks, which change none of them."""
 
 
 def record(exp: Any) -> Any:
     """Return what the analysis finds of an experiment, in tables of its own."""
-    key = json.dumps([exp.collection, exp.name, canonical(exp), storage.LEAN])
+    content = canonical(exp)
+    key = json.dumps([exp.collection, exp.name, content, storage.LEAN])
     if key not in RECORDS:
-        made = analyse_records(exp, {level: simulate_record(exp, level) for level in exp.levels})
+        asked = {name: content.pop(name) for name in ("checks", "title", "source")}
+        stored = [storage.stored_series(exp), storage.event_times(exp), storage.asks_for_peaks(exp)]
+        alike = json.dumps([content, stored, storage.LEAN, asked if storage.LEAN == 0 else None])
+
+        def once(name: str, make: Callable[..., Any]) -> Callable[..., Any]:
+            def known(*arguments: Any) -> Any:
+                if alike + name not in SHARED:
+                    SHARED[alike + name] = make(*arguments)
+                return SHARED[alike + name]
+
+            return known
+
+        levels = {
+            level: once(f"level {level}", simulate_record)(exp, level) for level in exp.levels
+        }
+        with pytest.MonkeyPatch.context() as patch:
+            patch.setattr(best_values, "table", once("numbers", best_values.table))
+            if not exp.published:  # whose rows are checks
+                patch.setattr(compare_levels, "motion", once("motion", compare_levels.motion))
+            made = analyse_records(exp, levels)
         for variable in (*made.coords.values(), *made.variables.values()):
             variable.values.flags.writeable = False
         RECORDS[key] = made

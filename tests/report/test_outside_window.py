@@ -82,7 +82,7 @@ def test_a_ratio_needs_two_levels_that_are_sound_and_do_not_vanish() -> None:
 
 
 def test_levels_of_the_same_order_before_those_that_are_used_are_not_called_too_coarse() -> None:
-    _, record = made(range(6, 19))
+    _, record = made(range(6, 19, 2))
     orders = record["u_observed_order"][0, 0, :, record.words("norm").index(TYPICAL_NORM)]
     assert abs(orders[0] - 2.0) < 0.02
     assert notes(record)[0] == "not needed"

@@ -84,7 +84,7 @@ def test_the_series_of_the_text():
     assert corrected.coeff(P, 4) != 0
 
 
-@pytest.mark.parametrize(("scheme", "options"), thinned(VARIANTS, 2))
+@pytest.mark.parametrize(("scheme", "options"), thinned(VARIANTS, 4))
 def test_the_error_at_a_time_is_that_of_the_exact_discrete_solution(scheme, options):
     """What is left falls with the power that is told."""
     method, w, t = scheme.stepper(options), 1.3, 1.7

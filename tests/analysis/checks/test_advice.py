@@ -14,8 +14,9 @@ from typing import Any
 import numpy as np
 import pytest
 from level_records import experiment, level_records, standard_error
+from sweeps import simulated
 
-from vibsim import Experiment, analyse, simulate
+from vibsim import Experiment
 from vibsim.analysis import analyse_records, verdicts
 from vibsim.checks.accurate import BASES
 from vibsim.checks.fields import name_of
@@ -28,6 +29,8 @@ from vibsim.core.vocabulary import DRIFTS, REASON_NAMES, REASONS, STATUSES
 from vibsim.experiment.schema.checks import MEASURED
 from vibsim.report.words import interval
 from vibsim.simulation import simulate_record
+
+pytestmark = pytest.mark.usefixtures("without_series")
 
 SCHEMA = Path(__file__).parents[3] / "workflow/schemas/experiment.schema.json"
 GOOD = {name for name, status in REASONS.items() if status == "PASS"}
@@ -335,6 +338,7 @@ def test_no_kind_of_check_is_left_out() -> None:
     assert set(KINDS) - {"best"} == set(MEASURED)
 
 
+@pytest.mark.usefixtures("with_series")
 @pytest.mark.slow
 @pytest.mark.parametrize(
     ("model", "words", "advised"),
@@ -357,7 +361,7 @@ def test_finer_levels_are_not_advised_where_all_of_them_fail_alike(
         "schemes": ["rk4"],
     }
     made = Experiment.from_dict(content)
-    (verdict,) = verdicts(made, analyse(made, [simulate(made, level) for level in made.levels]))
+    (verdict,) = verdicts(made, analyse_records(made, simulated(made)))
     assert verdict.reason == "non_finite"
     assert words in verdict.text
     assert advised in verdict.advice
@@ -406,6 +410,7 @@ PENDULUM = {"title": "t", "model": {"kind": "pendulum"}, "initial": {"theta": 1.
 RUN = {**PENDULUM, "time": {"end": 10.0}, "schemes": ["central"]}
 
 
+@pytest.mark.usefixtures("with_series")
 @pytest.mark.slow
 @pytest.mark.parametrize("value", ["end", "period"])
 def test_advice_on_a_number_is_right_when_it_is_followed(value: str) -> None:
@@ -461,7 +466,7 @@ def test_a_finer_level_is_asked_for_where_it_has_the_number() -> None:
 
 def judged(content: dict[str, Any]) -> Any:
     made = Experiment.from_dict(content)
-    (found,) = verdicts(made, analyse(made, [simulate(made, level) for level in made.levels]))
+    (found,) = verdicts(made, analyse_records(made, simulated(made)))
     return found
 
 
@@ -584,6 +589,7 @@ def test_an_interval_without_a_width_is_not_told() -> None:
 
 
 @pytest.mark.parametrize("kind", ["forward_euler", "central"])
+@pytest.mark.usefixtures("with_series")
 def test_as_many_finer_levels_are_asked_for_as_the_measured_changes_need(kind: str) -> None:
     """A number whose error halves from level to level needs more of them than one whose error falls to a quarter."""
     check = {"value": "end", "quantity": "theta", "equals": -0.7, "atol": 3e-5}

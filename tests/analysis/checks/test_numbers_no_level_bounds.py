@@ -13,6 +13,8 @@ from analysis.spring_runs import Run, judged
 from vibsim.experiment import Experiment
 from vibsim.simulation import simulate_record
 
+pytestmark = pytest.mark.usefixtures("without_series")
+
 PULSE = {
     "model": {"kind": "oscillator", "spring": "u", "force": "1000 if 3.301 < t < 3.304 else 0"},
     "initial": {"u": 1.0},
@@ -205,6 +207,7 @@ def test_the_frequency_of_a_decay_is_that_of_the_damped_motion() -> None:
     assert abs(found.results[0].value - 1.5) < 1e-7
 
 
+@pytest.mark.usefixtures("with_series")
 def test_lines_that_are_not_told_apart_decide_nothing() -> None:
     """Two modes of 1 and 1.1 in 60 s, of which the spectrum shows one line at 0.97."""
     content = {
@@ -283,6 +286,7 @@ NEAR_PI = {
 PHASE = {"value": "steady_phase", "quantity": "u", **BEST}
 
 
+@pytest.mark.usefixtures("with_series")
 def test_an_angle_whose_bound_goes_through_pi_is_neither_below_nor_above() -> None:
     """Its number is -2.60, with a bound of 1.1; the phase of the steady motion is 3.1404."""
     asked = ({"below": 0.0}, {"above": 0.0}, {"above": -1.0}, {"equals": 3.1404, "atol": 0.01})
@@ -309,6 +313,7 @@ def test_the_largest_of_angles_is_open_where_one_goes_through_pi() -> None:
     assert [one.status for one in found] == ["INCONCLUSIVE", "INCONCLUSIVE"]
 
 
+@pytest.mark.usefixtures("with_series")
 def test_a_steady_phase_of_an_unknown_bound_counts_what_is_left_of_the_start() -> None:
     """A linear oscillator after five periods: the phase is 2.8855, the levels agree on 2.9386."""
     content = {

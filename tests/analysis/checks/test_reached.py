@@ -14,6 +14,8 @@ from vibsim.analysis import analyse_records, keep_for_verdicts, summarise
 from vibsim.comparison.best_solution import best_record
 from vibsim.core.record import Record
 
+pytestmark = pytest.mark.usefixtures("without_series")
+
 STATES = ("theta", "omega")
 HARD = 22
 """Number of the member next to the separatrix, which the pilot does not try."""

@@ -7,9 +7,11 @@ from typing import Any
 
 import numpy as np
 import pytest
+from sweeps import simulated
 from thinned import thinned
 
 from vibsim import Experiment, Verdict, analyse, simulate, verdicts
+from vibsim.analysis import analyse_records
 from vibsim.apriori.force_discontinuities import switches_of, words_of
 from vibsim.schemes import FIXED_STEP, SCHEMES
 
@@ -36,7 +38,7 @@ def experiment(schemes: list[Any], **changes: Any) -> Experiment:
 
 
 def judged(made: Experiment) -> list[Verdict]:
-    return list(verdicts(made, analyse(made, [simulate(made, level) for level in made.levels])))
+    return list(verdicts(made, analyse_records(made, simulated(made))))
 
 
 TREATED = [

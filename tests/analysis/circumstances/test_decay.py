@@ -7,8 +7,10 @@ from typing import Any
 
 import numpy as np
 import pytest
+from sweeps import simulated
 
 from vibsim import Experiment, analyse, simulate, verdicts
+from vibsim.analysis import analyse_records
 
 pytestmark = pytest.mark.usefixtures("without_series")
 
@@ -29,7 +31,7 @@ def experiment(model: dict[str, Any], initial: dict[str, float], **more: Any) ->
 
 
 def judged(made: Experiment) -> Any:
-    return verdicts(made, analyse(made, [simulate(made, level) for level in made.levels]))
+    return verdicts(made, analyse_records(made, simulated(made)))
 
 
 def test_levels_that_do_not_see_a_decay_decide_nothing() -> None:

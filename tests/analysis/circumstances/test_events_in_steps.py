@@ -11,9 +11,11 @@ from typing import Any
 import numpy as np
 import pytest
 import yaml
+from sweeps import simulated
 from thinned import thinned
 
 from vibsim import Experiment, analyse, simulate, verdicts
+from vibsim.analysis import analyse_records
 from vibsim.core.vocabulary import REASON_NAMES
 
 pytestmark = pytest.mark.usefixtures("without_series")
@@ -91,7 +93,7 @@ def test_finer_levels_are_not_advised_where_they_count_the_same_bounces(
     scheme: Any, check: dict[str, Any], advice: str
 ) -> None:
     made = experiment(**BALL, time={"end": 5.0}, levels=[6, 7, 8], schemes=[scheme], checks=[check])
-    (verdict,) = verdicts(made, analyse(made, [simulate(made, level) for level in made.levels]))
+    (verdict,) = verdicts(made, analyse_records(made, simulated(made)))
     assert (verdict.status, verdict.reason) == ("FAIL", "mismatch")
     assert verdict.advice.startswith(advice)
 
@@ -196,7 +198,7 @@ def test_levels_that_differ_by_more_than_the_motion_decide_nothing() -> None:
         checks=[{"converges": "h", "order": order} for order in ("scheme", 2)],
         samples="common",
     )
-    found = verdicts(made, analyse(made, [simulate(made, level) for level in made.levels]))
+    found = verdicts(made, analyse_records(made, simulated(made)))
     assert {(one.status, one.reason) for one in found} == {("INCONCLUSIVE", "pre_asymptotic")}
 
 
@@ -211,7 +213,7 @@ def test_levels_that_notice_an_event_at_one_point_have_no_wrong_limit() -> None:
         schemes=[scheme],
         checks=[{"converges": "h"}],
     )
-    (found,) = verdicts(made, analyse(made, [simulate(made, level) for level in made.levels]))
+    (found,) = verdicts(made, analyse_records(made, simulated(made)))
     assert (found.status, found.reason) == ("INCONCLUSIVE", "non_smooth"), found.text
     assert "events: located" in found.advice
 
@@ -288,7 +290,7 @@ def test_the_time_of_an_event_has_an_error_from_the_levels() -> None:
 def test_the_time_of_an_event_on_the_mesh_is_not_trusted() -> None:
     near = [time_of(3, equals=impact(3), atol=0.5), time_of(3, equals=9.0, atol=0.5)]
     made = beads([SCHEMES["mesh"]], near)
-    found = verdicts(made, analyse(made, [simulate(made, level) for level in made.levels]))
+    found = verdicts(made, analyse_records(made, simulated(made)))
     for verdict in found:
         assert (verdict.status, verdict.reason) == ("INCONCLUSIVE", "pre_asymptotic")
         assert "events are left to the mesh" in verdict.text

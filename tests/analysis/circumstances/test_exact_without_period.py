@@ -5,8 +5,10 @@ from __future__ import annotations
 from typing import Any
 
 import pytest
+from sweeps import simulated
 
-from vibsim import Experiment, Verdict, analyse, simulate, verdicts
+from vibsim import Experiment, Verdict, verdicts
+from vibsim.analysis import analyse_records
 
 pytestmark = pytest.mark.usefixtures("without_series")
 
@@ -23,7 +25,7 @@ def judged(model: dict[str, Any], scheme: Any = "rk4", **changes: Any) -> Verdic
         **changes,
     }
     made = Experiment.from_dict(content)
-    found = verdicts(made, analyse(made, [simulate(made, level) for level in made.levels]))
+    found = verdicts(made, analyse_records(made, simulated(made)))
     return next(iter(found))
 
 

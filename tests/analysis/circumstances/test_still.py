@@ -5,8 +5,10 @@ from __future__ import annotations
 from typing import Any
 
 import pytest
+from sweeps import simulated
 
-from vibsim import Experiment, analyse, simulate, verdicts
+from vibsim import Experiment, verdicts
+from vibsim.analysis import analyse_records
 
 pytestmark = pytest.mark.usefixtures("without_series")
 
@@ -28,8 +30,7 @@ def judged(
         "checks": [{"converges": quantity} for quantity in quantities],
     }
     experiment = Experiment.from_dict(content)
-    levels = [simulate(experiment, level) for level in experiment.levels]
-    return list(verdicts(experiment, analyse(experiment, levels)))
+    return list(verdicts(experiment, analyse_records(experiment, simulated(experiment))))
 
 
 def damped(b: float) -> dict[str, Any]:
@@ -122,8 +123,7 @@ def of_checks(initial: dict[str, Any], *checks: dict[str, Any]) -> list[Any]:
         "checks": list(checks),
     }
     experiment = Experiment.from_dict(content)
-    levels = [simulate(experiment, level) for level in experiment.levels]
-    return list(verdicts(experiment, analyse(experiment, levels)))
+    return list(verdicts(experiment, analyse_records(experiment, simulated(experiment))))
 
 
 @pytest.mark.parametrize(

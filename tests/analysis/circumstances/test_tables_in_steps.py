@@ -7,8 +7,10 @@ from typing import Any
 
 import numpy as np
 import pytest
+from sweeps import simulated
 
 from vibsim import Experiment, Verdict, analyse, simulate, verdicts
+from vibsim.analysis import analyse_records
 from vibsim.apriori.formal_orders import left_to_the_mesh
 
 pytestmark = pytest.mark.usefixtures("without_series")
@@ -43,7 +45,7 @@ def experiment(steps: int, schemes: list[Any], checks: list[Any], **changes: Any
 
 
 def judged(made: Experiment) -> list[Verdict]:
-    return list(verdicts(made, analyse(made, [simulate(made, level) for level in made.levels])))
+    return list(verdicts(made, analyse_records(made, simulated(made))))
 
 
 def test_steps_that_end_at_the_points_have_the_order_of_the_scheme(folder: Path) -> None:
