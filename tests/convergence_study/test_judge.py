@@ -120,6 +120,18 @@ def test_an_order_may_be_a_lower_bound_or_unknown() -> None:
     assert judge(H, numbers(2.0)).status == "PASS"
 
 
+def test_a_lower_bound_passes_where_the_order_passes() -> None:
+    """The Runge-Kutta method SSP3 on the equations of Lotka and Volterra, with 8 to 128 steps."""
+    h = [1 / n for n in (8, 16, 32, 64, 128)]
+    values = [1.2364949626620536, 1.2384785350941918, 1.2387089710775914]
+    values += [1.238736455804971, 1.2387398025097935]
+    assert [x.status for x in (judge(h, values, order=3), judge(h, values, at_least=3))] == [
+        "PASS",
+        "PASS",
+    ]
+    assert judge(h, values, at_least=4).reason == "order_low"
+
+
 def test_levels_may_come_in_any_order_and_ratio() -> None:
     h = [0.13, 0.4, 0.05, 0.22, 0.31]
     verdict = judge(h, numbers(2.0, h), order=2)

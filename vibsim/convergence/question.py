@@ -58,5 +58,6 @@ class Question:
 
     @property
     def expected_order(self) -> ExpectedOrder | None:
-        """The expected order, which has a prior of its own."""
-        return None if self.expected is None else ExpectedOrder(self.expected, self.by_theory)
+        """The expected order, or the least one, which has a prior of its own."""
+        order = self.at_least if self.expected is None else self.expected
+        return None if order is None else ExpectedOrder(order, self.by_theory)
