@@ -280,7 +280,7 @@ def _causes_unseen(
         result[lost & noisy] = NOISE
         if q.block.stored_floor[-1] > 0.0:
             result[lost] = STORED
-        if q.name in (state.name for state in q.block.model.states):
+        if q.is_motion:
             result[lost & (e.difference[..., -1] >= FAR * e.size)] = PARTED
             result[lost & (e.size <= ROUND_OFF_SAFETY * e.relative_floor * e.scale)] = ZERO
         result[is_still & at_rest(e)] = STILL
