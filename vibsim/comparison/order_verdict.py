@@ -274,7 +274,7 @@ def _causes_unseen(
     result = np.full(judged.reason.shape, NONE, dtype=np.int8)
     has = partial(is_one_of, judged.reason)
     lost, is_still, is_coarse = has("round_off"), has(*UNSEEN), has("pre_asymptotic")
-    if np.any(lost | is_still | is_coarse):
+    if q.differences and np.any(lost | is_still | is_coarse):
         e = facts_of(q, norm, order, tolerance)
         noisy = e.difference[..., -1] > ABOVE_ROUND_OFF * floor_of_pairs(e)[..., -1]
         result[lost & noisy] = NOISE
