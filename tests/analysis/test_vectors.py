@@ -191,3 +191,28 @@ def test_coordinates_at_rest_in_different_places_do_not_move() -> None:
     )
     judged = verdicts(experiment, analyse_records(experiment, simulated(experiment)))
     assert [verdict.reason for verdict in judged] == ["not_applicable"] * 2
+
+
+def test_levels_of_a_chaotic_motion_part() -> None:
+    """Finer levels do not help: the advice is that of the coordinates."""
+    experiment = Experiment.from_dict(
+        {
+            "title": "chaos",
+            "model": {
+                "kind": "system",
+                "coordinates": ["x", "y"],
+                "acceleration": {"x": "-x*y*y - x*x*x/10", "y": "-x*x*y - y*y*y/10"},
+            },
+            "initial": {"x": 3.0, "y": 1.0, "vx": 0.5, "vy": 1.0},
+            "time": {"end": 60.0, "base_steps": 2400},
+            "levels": [0, 1, 2],
+            "samples": "common",
+            "schemes": ["rk4"],
+            "checks": [{"converges": name} for name in (POSITION, "x", "y")],
+        }
+    )
+    judged = verdicts(experiment, analyse_records(experiment, simulated(experiment)))
+    assert [verdict.reason for verdict in judged] == ["pre_asymptotic"] * 3
+    vector, *coordinates = facts(judged)
+    assert vector["parting_time"] == pytest.approx(coordinates[0]["parting_time"], rel=0.1)
+    assert "End the time interval" in judged[0].advice

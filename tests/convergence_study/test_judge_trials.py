@@ -74,6 +74,24 @@ def test_printed_values_with_too_few_digits_hide_the_order(values: list[float]) 
     assert verdict.order_low <= 2.0 <= verdict.order_high
 
 
+@pytest.mark.parametrize(
+    ("values", "said", "end"),
+    [
+        ([-1.6267, -1.6271, -1.627], "change sign", ", or judge another quantity."),
+        ([4.2, 4.0, 3.8, 3.7, 3.6], "contradict", "."),
+        ([2.5581, 2.5582, 2.5583], "not show a settled order yet (the last estimate is 0)", "."),
+        ([1.13, 1.12, 1.1], "grow towards the finer levels", "."),
+    ],
+)
+def test_no_finer_levels_where_values_have_few_digits(
+    values: list[float], said: str, end: str
+) -> None:
+    verdict = judge([0.1 * 2.0**-k for k in range(len(values))], values)
+    assert verdict.status == "INCONCLUSIVE"
+    assert said in verdict.sentence
+    assert verdict.advice.lower().endswith(f"use coarser levels, or give u with more digits{end}")
+
+
 def test_what_noise_explains_has_a_bound_and_not_the_error_0() -> None:
     verdict = judge(H, [1.001, 1.002, 0.9995, 1.0], order=2, noise=1e-3)
     assert verdict.reason == "exact"

@@ -55,7 +55,7 @@ TOLD = {
             "schemes": ["rk4"],
             "checks": [{"accurate": "velocity_vector", "relative": 0.1}],
         },
-        "checks[0]: velocity_vector adds squares of th, an angle, and of x: a sum means something only",
+        "checks[0]: velocity_vector adds squares of the rates of th, an angle, and of x: a sum means ",
     ),
     "angle": (
         {"initial": {"theta": 60}},

@@ -106,6 +106,7 @@ FAULTS = {
     "no list": ("model[0]=1", "model is not a list"),
     "list": ("levels.to=3", "levels is a list: name an entry by its number, e.g. levels[0]"),
     "name in a list": ("schemes.rk5.label=a", "schemes is a list: did you mean 'rk4'?"),
+    "check in a list": ("checks.chek_1.order=1", "checks is a list: did you mean 'check_1'?"),
     "no keys": ("model.g.x=3", "model.g is a value and has no keys"),
     "no value": ("model.g", "must be KEY=VALUE, e.g. model.g=1.62"),
     "no key": ("=1", "must be KEY=VALUE"),

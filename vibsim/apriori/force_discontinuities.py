@@ -193,8 +193,11 @@ def _of_scheme(
     is_within = ~is_on_a_point(at, dt[:, None])
     every = np.arange(cases)
 
-    def first(when: Floats) -> tuple[Floats, Floats, Integers]:
-        """Return the earliest corner; `when` has their times, infinite elsewhere, shape (switch, case, sample)."""
+    def first(when: Floats, *, is_jump: bool = False) -> tuple[Floats, Floats, Integers]:
+        """Return the earliest corner, or nothing if a jump is asked for and it is none.
+
+        `when` has the times of corners, infinite elsewhere, shape (switch, case, sample).
+        """
         sample = np.argmin(np.min(when, axis=0), axis=-1)
         switch = np.argmin(when[:, every, sample], axis=0)
         before, after = modes[:, every, sample], modes[:, every, sample].copy()
@@ -210,26 +213,25 @@ def _of_scheme(
         size = np.nanmax(np.abs(q), axis=-1)[switch, every]
         exists = np.isfinite(when[switch, every, sample])
         power = np.where(exists, path.power(edge[switch, every, sample], size), np.nan)
-        exists &= np.isfinite(power)
+        exists &= (power == 1.0) if is_jump else np.isfinite(power)
         return (
-            power,
+            np.where(exists, power, np.nan),
             np.where(exists, when[switch, every, sample], np.nan),
             np.where(exists, switch - len(law.switches) + len(switches_of(law.model)), -1),
         )
 
-    jump = first(np.where(passed & in_time & ~is_within, at, np.inf))
+    jump = first(np.where(passed & in_time & ~is_within, at, np.inf), is_jump=True)
     # the first passage of each switch inside a step
     masks = np.eye(len(q), dtype=bool)[:, :, None, None]
     corners = [first(np.where(passed & is_within & mask, at, np.inf)) for mask in masks]
-    for mask in masks if at_event.any() else ():
-        power, time, switch = first(np.where(at_event & mask, at, np.inf))
+    if at_event.any():
         # as at a grid point, only a jump matters
-        corners.append((np.where(power == 1.0, power, np.nan), time, switch))
+        corners += [first(np.where(at_event & mask, at, np.inf), is_jump=True) for mask in masks]
     powers, times, switches = (np.stack(column) for column in zip(*corners, strict=True))
     # the roughest of these, and the earliest if several are equally rough
     which = np.lexsort((times, powers), axis=0)[0]
     least, least_time, switch = powers[which, every], times[which, every], switches[which, every]
-    is_jump = (jump[0] == 1.0) & ~((least <= 1.0) & (least_time <= jump[1]))
+    is_jump = np.isfinite(jump[0]) & ~((least <= 1.0) & (least_time <= jump[1]))
     power, time, switch = (
         np.where(is_jump, *pair) for pair in zip(jump, (least, least_time, switch), strict=True)
     )

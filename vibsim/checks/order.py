@@ -98,8 +98,7 @@ def measure(block: MemberBlock, compared: Compared, check: ConvergesCheck) -> Me
     """Return the measured fields of a check, with those that would settle or explain the verdict."""
     quantity, norm = compared[check.converges], check.norm
     judged, order = judge_check(quantity, check), order_of(quantity, check.order)
-    is_state = check.converges in (state.name for state in block.model.states)
-    agreement = parting(quantity, is_state & (judged.reason == code("pre_asymptotic")))
+    agreement = parting(quantity, quantity.is_motion & (judged.reason == code("pre_asymptotic")))
     return {
         "status": judged.status,
         "reason": judged.reason,

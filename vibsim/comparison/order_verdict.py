@@ -274,13 +274,13 @@ def _causes_unseen(
     result = np.full(judged.reason.shape, NONE, dtype=np.int8)
     has = partial(is_one_of, judged.reason)
     lost, is_still, is_coarse = has("round_off"), has(*UNSEEN), has("pre_asymptotic")
-    if np.any(lost | is_still | is_coarse):
+    if q.differences and np.any(lost | is_still | is_coarse):
         e = facts_of(q, norm, order, tolerance)
         noisy = e.difference[..., -1] > ABOVE_ROUND_OFF * floor_of_pairs(e)[..., -1]
         result[lost & noisy] = NOISE
         if q.block.stored_floor[-1] > 0.0:
             result[lost] = STORED
-        if q.name in (state.name for state in q.block.model.states):
+        if q.is_motion:
             result[lost & (e.difference[..., -1] >= FAR * e.size)] = PARTED
             result[lost & (e.size <= ROUND_OFF_SAFETY * e.relative_floor * e.scale)] = ZERO
         result[is_still & at_rest(e)] = STILL

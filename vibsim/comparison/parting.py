@@ -40,7 +40,8 @@ def parting(q: Comparison, asked: Flags) -> Floats:
     fractions = np.asarray(q.block.grid.t) / q.block.grid.t[-1]
     size = largest(q.values[-1])
     for scheme, case in zip(*np.nonzero(asked), strict=True):
-        distance = np.maximum.accumulate(np.abs(q.differences[-1][scheme, case]))
+        rows = np.abs(q.differences[-1][scheme, case]).reshape(-1, q.width)
+        distance = np.maximum.accumulate(np.max(rows, axis=-1))
         far = np.flatnonzero(distance >= FAR * size[scheme, case])
         if not len(far):
             continue

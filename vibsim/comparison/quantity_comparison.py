@@ -108,6 +108,11 @@ class Comparison:
         return value, bound + ROUND_OFF_SAFETY * self.floor[..., -1:] + unseen
 
     @property
+    def is_motion(self) -> bool:
+        """Whether this is a state or a vector of states."""
+        return bool(self.parts) or self.name in (state.name for state in self.block.model.states)
+
+    @property
     def points(self) -> int:
         """Number of points of a series."""
         return len(self.block.grid.t) * self.width

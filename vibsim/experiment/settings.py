@@ -99,11 +99,18 @@ def _entry(node: Node | None, path: Path_, tail: str) -> tuple[int, str] | None:
         _check_index(node, path, place)
         return place, tail[index.end() :]
     entries = node.value if node is not None and isinstance(node.value, list) else ()
-    for place, entry in enumerate(entries):
-        name = _name_of(entry) or (f"check_{place + 1}" if path == ("checks",) else "")
+    for place, name in enumerate(_names(entries, path)):
         if name and (tail == name or tail.startswith(f"{name}.")):
             return place, tail[len(name) + 1 :]
     return None
+
+
+def _names(entries: Sequence[object], path: Path_) -> list[str]:
+    """Return the names of the entries of a list; messages count checks without a name."""
+    is_check = path == ("checks",)
+    return [
+        _name_of(entry) or (f"check_{i}" if is_check else "") for i, entry in enumerate(entries, 1)
+    ]
 
 
 def _name_of(entry: object) -> str:
@@ -136,7 +143,7 @@ def _check_name(node: Node | None, path: Path_, name: str) -> None:
     if node is None or node.value is None or node.keys is not None or _is_scheme(path, node):
         return
     if isinstance(node.value, list):
-        names = [*filter(None, map(_name_of, node.value))]
+        names = [*filter(None, _names(node.value, path))]
         by_number = f"name an entry by its number, e.g. {where}[0]"
         raise _SettingError(f"{where} is a list", nearest(name, names) if names else by_number)
     raise _SettingError(f"{where} is a value and has no keys")

@@ -463,6 +463,12 @@ def test_adaptive_schemes_have_errors_and_no_orders() -> None:
     assert float(run.record["t"][-1]) == PERIODS
 
 
+def test_an_adaptive_scheme_with_one_level_has_no_order() -> None:
+    checks = [{"converges": "u"}, {"converges": "u", "schemes": ["dop853"]}]
+    run = spring(["rk4", {"kind": "dop853", "tolerance": 1e-6}], *checks, levels=[0])
+    assert [verdict.reason for verdict in run.verdicts] == ["too_few_levels", "not_applicable"]
+
+
 def test_notes_and_tables_of_a_source_reach_the_summary() -> None:
     p = 2 * np.pi * PERIODS / STEPS
     value = {"value": "relative_energy_error_d2t"}

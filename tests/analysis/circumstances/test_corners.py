@@ -201,20 +201,27 @@ def test_a_velocity_that_an_event_turns_has_passed_no_corner() -> None:
 
 
 @pytest.mark.usefixtures("with_series")
-@pytest.mark.parametrize(("then", "jumps"), [({"v": "0.9*v"}, True), ({"u": "u - 0.1"}, False)])
+@pytest.mark.parametrize(
+    ("acceleration", "then", "jumps"),
+    [
+        ("-sin(0.25*sign(u) - u)", {"v": "0.9*v"}, True),
+        ("-sin(0.25*sign(u) - u)", {"u": "u - 0.1"}, False),
+        ("-0.2 - abs(u)", {"v": "0.9*v"}, False),
+    ],
+)
 def test_a_force_that_jumps_where_an_event_is_has_a_corner(
-    then: dict[str, str], *, jumps: bool
+    acceleration: str, then: dict[str, str], *, jumps: bool
 ) -> None:
     """A rocking block: steps end at the impact, but rounding and stages decide on which side the force is taken."""
     model = {
-        **{"kind": "system", "acceleration": "-sin(0.25*sign(u) - u)"},
+        **{"kind": "system", "acceleration": acceleration},
         "events": [{"when": "u", "falling": True, "then": then}],
     }
     time, power, what = corner(model, initial={"u": 0.15}, time={"end": 2.5})
     if jumps:
         assert (time, power, what) == (pytest.approx(1.5690, abs=0.02), 1.0, "u passes zero")
     else:
-        assert math.isnan(power)
+        assert (math.isnan(time), math.isnan(power), what) == (True, True, "")
 
 
 def test_a_turn_with_friction_is_an_event_and_no_corner_within_a_step() -> None:

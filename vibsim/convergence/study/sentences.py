@@ -56,11 +56,10 @@ LOOK_FOR = (
     "Look for a part of lower order, such as the first step, a formula at a boundary, a limiter, or an iteration that "
     "stops too early"
 )
-NOT_FINER = "Use coarser levels, or {less_noise}."
 ROUNDED = (
     "If the step sizes were rounded to the digits that they have, that alone may change the order."
 )
-MORE_DIGITS = "Give {size} with more digits, such as 1/n for n cells. If it has no more, add a finer level{such_as}."
+MORE_DIGITS = "Give {size} with more digits, such as 1/n for n cells. If it has no more, {finer}."
 SENTENCES: Mapping[str, tuple[str, str]] = MappingProxyType(
     {
         "asymptotic": ("{quantity} converges with order {order}{as_expected}.", ""),
@@ -87,36 +86,35 @@ SENTENCES: Mapping[str, tuple[str, str]] = MappingProxyType(
         ),
         "pre_asymptotic": (
             "The levels of {quantity} do not show a settled order yet{estimate}.",
-            "Add a finer level{such_as}.",
+            "{finer}.",
         ),
         "noisy": (
             "The finest levels of {quantity} differ by little more than {noise}, so they do not show a settled order"
             "{estimate}.",
-            NOT_FINER,
+            "{finer}.",
         ),
         "rounded": (
             "The levels of {quantity} do not show a settled order yet{estimate}. The rounding of the values to their "
             "last digit may hide it.",
-            NOT_FINER,
+            "{finer}.",
         ),
         "contradicted": (
             "The levels of {quantity} down to {size} = {last_used} fit order {order}, but finer ones contradict them: "
             "they differ by more than the levels before them.",
-            "Check the step size, the last step and the input of the finest runs. If they are right, add a finer level"
-            "{such_as}.",
+            "Check the step size, the last step and the input of the finest runs. If they are right, {finer}.",
         ),
         "growing": (
             "The differences of {quantity} grow towards the finer levels{estimate}.",
             "Check that {size} is a step size, not a number of cells or steps, and that each level has its own. If so, "
-            "add a finer level{such_as}.",
+            "{finer}.",
         ),
         "round_off": (
             "The differences of {quantity} look like {floor}, so they do not show its order{estimate}.",
-            NOT_FINER,
+            "Use coarser levels, or {less_noise}.",
         ),
         "oscillating": (
             "The differences of {quantity} change sign from level to level, so no order can be read from them.",
-            "Add a finer level{such_as}, or judge another quantity.",
+            "{finer}, or judge another quantity.",
         ),
         "too_few_levels": (
             "{count} too few to judge the convergence of {quantity}. Three are needed, and four are better.",
@@ -141,7 +139,7 @@ def describe(facts: LadderVerdict, setting: Setting) -> tuple[str, str]:
         key = "noisy"
     elif key == "pre_asymptotic" and setting.is_contradicted and facts.order is not None:
         key = "contradicted"
-    elif facts.order is not None and facts.order < 0.0 and _is_growth(facts, setting):
+    elif facts.order is not None and round(facts.order, 3) < 0.0 and _is_growth(facts, setting):
         key = "growing"
     elif key == "pre_asymptotic" and setting.are_digits_few:
         key = "rounded"
@@ -167,7 +165,7 @@ def describe(facts: LadderVerdict, setting: Setting) -> tuple[str, str]:
         return _joined([sentence, *more, *(() if confirmed else setting.notes)]), ""
     if is_moved and setting.are_sizes_rounded:
         advice = MORE_DIGITS.format_map(phrases)
-    return _joined([sentence, *more]), _joined([advice, *setting.notes])
+    return _joined([sentence, *more]), _joined([advice[:1].upper() + advice[1:], *setting.notes])
 
 
 def _is_growth(facts: LadderVerdict, setting: Setting) -> bool:
@@ -200,6 +198,11 @@ def _phrases(facts: LadderVerdict, setting: Setting) -> dict[str, Any]:
         as_expected = f", {wanted} as expected"
     else:
         wanted, as_expected = "another one", ""
+    less_noise = (
+        f"give {facts.quantity} with more digits"
+        if setting.are_digits_few
+        else f"compute {facts.quantity} with less noise"
+    )
     points = "Take levels that have the coarsest points in common (restrict: subset)"
     return {
         "quantity": facts.quantity,
@@ -210,9 +213,10 @@ def _phrases(facts: LadderVerdict, setting: Setting) -> dict[str, Any]:
         "value": "value" if facts.is_number else "values",
         "noise": "the stated noise" if setting.is_noise_stated else "round-off",
         "floor": "the stated noise" if setting.is_noise_stated else "round-off or other noise",
-        "less_noise": f"give {facts.quantity} with more digits"
-        if setting.are_digits_few
-        else f"compute {facts.quantity} with less noise",
+        "less_noise": less_noise,
+        "finer": f"use coarser levels, or {less_noise}"
+        if setting.is_noise_seen or setting.are_digits_few
+        else f"add a finer level{such_as}",
         "not_finite": f"{facts.size_name} = {listed(not_finite)}",
         "these": these,
         "estimate": f" (the last estimate is {number(round(facts.order, 3) + 0.0, 3)})"

@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from vibsim.core.vocabulary import VECTORS
+from vibsim.core.vocabulary import VECTORS, VELOCITY_VECTOR
 from vibsim.experiment.faults import Report
 from vibsim.experiment.rules.formulas import NAME
 from vibsim.experiment.rules.members import MemberNumbers
@@ -100,7 +100,8 @@ def _warn_mixed(path: Path_, vector: str, model: Model, report: Report) -> None:
     turning = set(angles(model)) & set(model.positions)
     others = [name for name in model.positions if name not in turning]
     if model.dimensionless and turning and others:
-        rule = f"{vector} adds squares of {min(turning)}, an angle, and of {others[0]}"
+        rates = "the rates of " if vector == VELOCITY_VECTOR else ""
+        rule = f"{vector} adds squares of {rates}{min(turning)}, an angle, and of {others[0]}"
         report.note(path, rule, "a sum means something only in one unit")
 
 
