@@ -183,7 +183,7 @@ def _reasons(record: Record, quantity: str, scheme: int) -> Map:
         text = f"{REASONS[word]}: {word} ({words.number(number, 'integer')})"
         codes.append((text, style.REASON_COLOURS[word]))
     return Map(
-        f"{quantity}_verdict", f"verdict on {words.symbol(quantity)}", quantity, positions, kind="code",
+        f"{quantity}_verdict", f"verdict on {words.title(quantity)}", quantity, positions, kind="code",
         codes=tuple(codes), shared=view.shared_verdict(record, quantity, scheme),
     )  # fmt: skip
 

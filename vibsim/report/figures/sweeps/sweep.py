@@ -248,7 +248,7 @@ class _Drawing:
 
     def verdict(self, quantity: str) -> Iterator[View | str]:
         """Yield the verdict on every member's order, one row per scheme."""
-        name = f"verdict on {words.symbol(quantity)}"
+        name = f"verdict on {words.title(quantity)}"
         if f"{quantity}_status" not in self.record:
             return
         status = data.flags(self.record, f"{quantity}_status")

@@ -87,7 +87,7 @@ def shared_verdict(record: Record, quantity: str, scheme: int | None = None) -> 
     reasons = np.unique(reason.astype(str))
     if reasons.size != 1:
         return ""
-    return f"verdict on {words.symbol(quantity)} {REASONS[reasons[0]]} ({reasons[0]})"
+    return f"verdict on {words.title(quantity)} {REASONS[reasons[0]]} ({reasons[0]})"
 
 
 def shared(name: str, values: Floats, unit: str = "", form: str = "step") -> str:
