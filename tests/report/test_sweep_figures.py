@@ -302,6 +302,7 @@ def bare(monkeypatch):
     )
     # what was found with them says nothing here
     monkeypatch.setattr(samples, "RECORDS", {})
+    monkeypatch.setattr(samples, "SHARED", {})
     for module in [m for n, m in list(sys.modules.items()) if n.startswith("vibsim")]:
         if getattr(module, "MODELS", None) is MODELS:
             monkeypatch.setattr(module, "MODELS", known)

@@ -15,8 +15,6 @@ from vibsim import Experiment, Verdict, analyse, simulate, verdicts
 from vibsim.analysis.blockwise import keep_for_verdicts
 from vibsim.core.record import Record
 
-pytestmark = pytest.mark.usefixtures("without_series")
-
 Content = dict[str, Any]
 
 SPRING: Content = {
@@ -43,6 +41,8 @@ def levels_of(content: Content, *, with_exact: bool = True) -> dict[int, xarray.
 
 
 def without_exact(levels: dict[int, xarray.Dataset]) -> dict[int, xarray.Dataset]:
+    """Drop the exact solution; without series there is none to drop, and the analysis computes it."""
+    assert all(data.attrs["storage"] == "series" for data in levels.values())
     return {
         level: data.drop_vars([str(name) for name in data if "_exact" in str(name)])
         for level, data in levels.items()
@@ -87,7 +87,6 @@ def test_a_known_error_is_the_true_one() -> None:
     assert found.text.startswith(f"u is accurate to {error / size:.2g} of its size at level 9")
 
 
-@pytest.mark.usefixtures("with_series")
 @pytest.mark.slow
 @pytest.mark.parametrize(
     ("content", "levels"),
@@ -116,7 +115,6 @@ def test_an_estimated_error_is_the_true_one_within_its_bound(
         assert told["error"] == pytest.approx(error, rel=0.3), scheme
 
 
-@pytest.mark.usefixtures("with_series")
 @pytest.mark.slow
 def test_a_jump_of_the_force_beside_a_point_of_all_levels_is_part_of_the_bound() -> None:
     """Levels that meet it too early by the same agree on another motion; the true error is that from the reference."""
@@ -190,7 +188,6 @@ def test_a_small_error_passes_and_a_large_one_fails_with_the_level_that_reaches_
     assert [v.status for v in asked(more, a_little, with_exact=with_exact)] == ["PASS"]
 
 
-@pytest.mark.usefixtures("with_series")
 @pytest.mark.slow
 def test_what_lies_between_the_bounds_is_open() -> None:
     (found,) = asked(PENDULUM, SMALL, with_exact=False)
@@ -243,7 +240,6 @@ def test_an_error_that_may_be_round_off_is_open_where_it_is_known() -> None:
         2,
     ),
 )
-@pytest.mark.usefixtures("with_series")
 def test_an_estimate_without_an_order_decides_nothing(
     reason: str, content: Content, quantity: str
 ) -> None:
@@ -260,7 +256,6 @@ def test_an_estimate_without_an_order_decides_nothing(
         assert (much.status, little.status == "PASS") == ("PASS", False)
 
 
-@pytest.mark.usefixtures("with_series")
 def test_levels_that_oscillate_decide_nothing() -> None:
     content = {**SPRING, "checks": [{"accurate": "u", "relative": 10.0}]}
     levels = levels_of(content, with_exact=False)
@@ -293,7 +288,6 @@ def test_where_there_is_no_error_nothing_is_judged() -> None:
     assert found.status == "PASS"
 
 
-@pytest.mark.usefixtures("with_series")
 def test_a_scheme_that_chooses_its_own_steps_has_a_true_error_and_no_estimate() -> None:
     content = {**PENDULUM, "schemes": ["central", {"kind": "dop853", "label": "own"}]}
     check = {"accurate": "theta", "relative": 1e-3, "schemes": ["own"]}
@@ -355,7 +349,6 @@ def test_a_verdict_on_an_order_states_the_same_error(with_exact: bool) -> None:
         assert f"The root-mean-square error of the finest level is {size}." in found.text
 
 
-@pytest.mark.usefixtures("with_series")
 @pytest.mark.slow
 def test_a_bound_with_other_digits_is_stated() -> None:
     content = {**PENDULUM, "schemes": ["forward_euler"], "levels": [12, 13, 14]}
@@ -365,7 +358,6 @@ def test_a_bound_with_other_digits_is_stated() -> None:
     assert f"of its size), at most {told['error_bound'] / math.sqrt(20.0):.2g}." in found.text
 
 
-@pytest.mark.usefixtures("with_series")
 def test_an_error_is_stated_where_it_is_believed_alone() -> None:
     coarse = {**PENDULUM, "levels": [4, 5, 6], "schemes": ["rk4"]}
     for with_exact in (True, False):
@@ -439,7 +431,6 @@ FRICTION: Content = {
 }
 
 
-@pytest.mark.usefixtures("with_series")
 @pytest.mark.slow
 @pytest.mark.parametrize("content", [FRICTION, {**SPRING, "sweep": {"model.w": [0.5, 1.0, 2.0]}}])
 def test_a_large_sweep_says_the_same_as_a_small_one(

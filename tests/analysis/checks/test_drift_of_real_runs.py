@@ -9,8 +9,6 @@ from thinned import thinned
 
 from vibsim import Experiment, analyse, simulate, verdicts
 
-pytestmark = pytest.mark.usefixtures("without_series")
-
 DRIFTS = ("none", "bounded", "linear", "quadratic")
 
 
