@@ -1,4 +1,4 @@
-"""What `make torture` begins with: one case of each kind, and each edit with exactly the jobs that it needs."""
+"""One case of each kind (`make torture`); the edits in `edits.EDITS`, each with exactly the jobs that it needs."""
 
 from __future__ import annotations
 
