@@ -84,7 +84,7 @@ def numbers(q: Comparison) -> Table:
     add("richardson_error_norm", (*MEMBER, "norm"), norms, words)
     if block.lean:
         words = "largest error bound of the extrapolation"
-        add("richardson_error_max", MEMBER, q.largest_bound * np.sqrt(q.width), words)
+        add("richardson_error_max", MEMBER, q.bound_of_length, words)
     add("floor", level_dims, q.floor * np.sqrt(q.width), "predicted round-off")
     is_due = not is_error_part(q.name) or is_promised(block.experiment, q.name)
     words = f"{q.long_name}: {PROMISED_ORDER if is_due else LEAST_ORDER}"

@@ -133,6 +133,11 @@ class Comparison:
         # a bound never decreases with time
         return self.extrapolation[1][..., -1]
 
+    @property
+    def bound_of_length(self) -> Floats:
+        """The largest bound over time; for a vector, that of its length."""
+        return np.asarray(self.largest_bound * np.sqrt(self.width))
+
     @cached_property
     def are_numbers(self) -> Flags:
         """Whether the levels differ at no more than two points, shape (scheme, case)."""

@@ -268,12 +268,6 @@ def _estimate_defect(p: Place) -> Floats:
     return safe_ratio(largest(estimate - error), largest(error))
 
 
-def _largest_bound(p: Place) -> Floats:
-    """Return the largest bound of the extrapolated solution, of a vector that of its length."""
-    q = p.comparison()
-    return p.missing if q is None else q.largest_bound * np.sqrt(q.width)
-
-
 def _gathered(name: str) -> Number:
     return lambda p: p.gathered(name)
 
@@ -332,6 +326,6 @@ NUMBERS: Mapping[str, Number] = {
     "observed_order": _of_triple(lambda q: q.observed_orders("l2")),
     "ratio": _of_triple(lambda q: q.ratios("l2")),
     "coincidence": _of_triple(lambda q: q.coincidence),
-    "richardson_error": _largest_bound,
+    "richardson_error": lambda p: q.bound_of_length if (q := p.comparison()) else p.missing,
 }
 """The function that computes each number, by its name."""

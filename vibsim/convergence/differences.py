@@ -21,8 +21,6 @@ from vibsim.elementary.exact import whole_power
 
 SAFE_SQUARES = 1e140
 """Sums of squares of numbers between this and its inverse neither overflow nor underflow."""
-
-
 NEWTON_STEPS = 8
 """After so many, the error is rounding alone, even if one gap is 1000 times the other."""
 
