@@ -193,7 +193,7 @@ def test_the_error_over_the_step_is_in_the_norm_of_the_check(norm):
     with style.applied():
         ax = drawn.against_step(record, decisive).figure.axes[0]
     lines = {line.get_label(): np.asarray(line.get_ydata()) for line in ax.lines}
-    here = {"scheme": 0, "case": 0, "norm": data.norm_index(record, norm)}
+    here = {"scheme": 0, "case": 0, "norm": norm}
     true = data.pick(record, "theta_error_norm", **here)
     mean = {"l1": 20.0, "l2": 20.0**0.5}.get(norm, 1.0)
     np.testing.assert_allclose(lines["true"], true / mean, rtol=1e-12)
@@ -352,7 +352,7 @@ def test_an_order_beside_the_band_whose_interval_reaches_it_is_told_as_such(monk
         (2.3, 2.15, "1 of 2 members has"),
     ):
         ends = (np.array([row]) for row in ([2.0, order], [2.0, low], [2.0, order]))
-        monkeypatch.setattr(drawn.finest_level, "orders", lambda *_, ends=tuple(ends): ends)
+        monkeypatch.setattr(data, "orders", lambda *_, ends=tuple(ends): ends)
         with style.applied():
             assert drawn.orders(exp, record, decisive).title.startswith(title)
 

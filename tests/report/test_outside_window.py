@@ -10,7 +10,7 @@ import pytest
 from vibsim import Experiment, analyse, simulate, verdicts
 from vibsim.core.record import Record
 from vibsim.core.vocabulary import TYPICAL_NORM
-from vibsim.report import data, style
+from vibsim.report import style
 from vibsim.report.data import Member
 from vibsim.report.figures import time
 from vibsim.report.tables import levels as tables
@@ -42,8 +42,7 @@ def made(levels: range, noise: float = 0.0, **more: Any) -> tuple[Any, Record]:
 
 def notes(record: Record) -> list[str]:
     """Return what the table of levels says of each of them."""
-    norm = data.norm_index(record, TYPICAL_NORM)
-    return tables._notes(record, "u", Member(0, 0, "central"), norm)
+    return tables._notes(record, "u", Member(0, 0, "central"), TYPICAL_NORM)
 
 
 def legend(record: Record) -> str:

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from vibsim.apriori.roundoff_floor import norm_of_floor
 from vibsim.core.array_types import Flags, Floats
 from vibsim.core.record import Record
-from vibsim.core.vocabulary import OF_LEVEL, TYPICAL_NORM
+from vibsim.core.vocabulary import MEMBER, OF_LEVEL, TYPICAL_NORM
 from vibsim.report import words
 from vibsim.report.style import finite, label
 from vibsim.simulation.scaled import has_time_unit
@@ -55,25 +55,32 @@ class Member:
         return f"{self.scheme}_{plain}_{self.role}" if self.role else f"{self.scheme}_{plain}"
 
 
-def pick(record: Record, name: str, **index: int) -> NDArray[Any]:
-    """Return a variable at given positions of its dimensions; positions of dimensions that it lacks are ignored."""
+def pick(record: Record, name: str, norm: str = TYPICAL_NORM, **index: int) -> NDArray[Any]:
+    """Return a variable at given positions of its dimensions, and in one `norm` if it has several.
+
+    Positions of dimensions that it lacks are ignored.
+    """
     variable = record.variable(name)
+    if "norm" in variable.dims:
+        index["norm"] = record.words("norm").index(norm)
     return np.asarray(variable.values[tuple(index.get(dim, slice(None)) for dim in variable.dims)])
 
 
-def at(record: Record, name: str, member: Member, **index: int) -> Floats:
+def at(record: Record, name: str, member: Member, norm: str = TYPICAL_NORM, **index: int) -> Floats:
     """Return a variable of one member as floats (see `pick`)."""
-    values = pick(record, name, scheme=member.scheme, case=member.case, **index)
+    values = pick(record, name, norm, scheme=member.scheme, case=member.case, **index)
     return np.asarray(values, dtype=np.float64)
 
 
-def optional(record: Record, name: str, dims: tuple[str, ...], **index: int) -> Floats:
+def optional(
+    record: Record, name: str, dims: tuple[str, ...], norm: str = TYPICAL_NORM, **index: int
+) -> Floats:
     """Return the slice of an optional variable (see `pick`); NaN of shape `dims` if the record lacks it.
 
     Not every model has an exact solution or an exact period.
     """
     if name in record:
-        return np.asarray(pick(record, name, **index), dtype=np.float64)
+        return np.asarray(pick(record, name, norm, **index), dtype=np.float64)
     return np.full([record.sizes[dim] for dim in dims], np.nan)
 
 
@@ -145,11 +152,6 @@ def norm_unit(record: Record, quantity: str, norm: str = TYPICAL_NORM) -> str:
     # a single level has errors but no differences
     base = unit(record, f"{quantity}_difference_norm") or unit(record, f"{quantity}_error_norm")
     return f"{base} {extra}".strip()
-
-
-def norm_index(record: Record, norm: str = TYPICAL_NORM) -> int:
-    """Return the position of a norm along the dimension ``norm``."""
-    return record.words("norm").index(norm)
 
 
 def times(record: Record, case: int) -> Floats:
@@ -280,17 +282,26 @@ def promised_text(record: Record, quantity: str, scheme: int) -> str:
     return f"{orders[0]:g}".replace("inf", "∞")
 
 
+def orders(record: Record, quantity: str, norm: str = TYPICAL_NORM) -> list[Floats]:
+    """Return the order of every scheme and member, stated or estimated, and the ends of its interval."""
+    # a large sweep has orders only for the quantities of checks
+    return [
+        optional(record, f"{quantity}_order{end}", MEMBER, norm) for end in ("", "_low", "_high")
+    ]
+
+
+def stated_orders(record: Record, quantity: str, norm: str = TYPICAL_NORM) -> list[Floats]:
+    """Return the same `orders`, but NaN where the verdict is undecided."""
+    undecided = is_undecided(record, quantity)
+    return [np.where(undecided, np.nan, part) for part in orders(record, quantity, norm)]
+
+
 def stated_order(
-    record: Record, quantity: str, member: Member, norm: int
-) -> tuple[float, float, float]:
-    """Return the stated order and the ends of its interval; NaN if no order is stated."""
-    if is_undecided(record, quantity)[member.scheme, member.case]:
-        return math.nan, math.nan, math.nan
-    order, low, high = (
-        float(at(record, f"{quantity}_order{end}", member, norm=norm))
-        for end in ("", "_low", "_high")
-    )
-    return order, low, high
+    record: Record, quantity: str, member: Member, norm: str = TYPICAL_NORM
+) -> list[float]:
+    """Return the stated order of a member and the ends of its interval; NaN if no order is stated."""
+    stated = stated_orders(record, quantity, norm)
+    return [float(part[member.scheme, member.case]) for part in stated]
 
 
 def is_undecided(record: Record, quantity: str) -> Flags:
@@ -316,7 +327,7 @@ def sound_pairs(record: Record, quantity: str, member: Member) -> list[bool]:
     if last >= 0:
         return [finer <= last for finer in levels[1:]]
     floor = floor_norm(record, quantity, member, TYPICAL_NORM)
-    differences = at(record, f"{quantity}_difference_norm", member, norm=norm_index(record))
+    differences = at(record, f"{quantity}_difference_norm", member)
     return [bool(d > ABOVE_FLOOR * max(floor[i], floor[i + 1])) for i, d in enumerate(differences)]
 
 

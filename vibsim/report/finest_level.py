@@ -12,9 +12,9 @@ import numpy as np
 
 from vibsim.core.array_types import Flags, Floats
 from vibsim.core.record import Record
-from vibsim.core.vocabulary import MEMBER, TYPICAL_NORM
+from vibsim.core.vocabulary import MEMBER
 from vibsim.report import data
-from vibsim.report.data import Member, formal_orders, norm_index, optional, whole
+from vibsim.report.data import Member, formal_orders, optional, whole
 from vibsim.report.style import finite, no_zeros
 
 LAST_PART = 4
@@ -62,61 +62,34 @@ class Error:
 
 def error(record: Record, quantity: str) -> Error:
     """Return the error of a quantity at the finest level, in the typical norm."""
-    norm, true = norm_index(record), true_error(record, quantity)
+    true = true_error(record, quantity)
     if not whole(record, "pair"):
         nothing = np.full_like(true, np.nan)
         return Error(true, nothing, nothing, nothing)
-    last = data.pick(record, f"{quantity}_difference_norm", norm=norm, pair=-1)
-    order, low, high = orders(record, quantity)
+    last = data.pick(record, f"{quantity}_difference_norm", pair=-1)
+    order, low, high = data.orders(record, quantity)
     stated = np.where(np.isfinite(order), order, formal_orders(record, quantity))
     return Error(true, *(last * _error_fraction(record, p) for p in (stated, high, low)))
 
 
 def true_error(record: Record, quantity: str) -> Floats:
     """Return the norm of the true error of the finest level, shape (scheme, case); NaN without an exact solution."""
-    norm = norm_index(record)
-    return optional(record, f"{quantity}_error_norm", MEMBER, norm=norm, level=-1)
+    return optional(record, f"{quantity}_error_norm", MEMBER, level=-1)
 
 
 def norms(record: Record, quantity: str, member: Member) -> Floats:
     """Return the true error of a member at every level, or the differences of its levels if it is unknown."""
 
     def norm(name: str) -> Floats:
-        return no_zeros(data.at(record, f"{quantity}_{name}_norm", member, norm=norm_index(record)))
+        return no_zeros(data.at(record, f"{quantity}_{name}_norm", member))
 
     is_known = np.isfinite(norm("error")).any() or not whole(record, "pair")
     return norm("error") if is_known else np.append(norm("difference"), np.nan)
 
 
-def orders(
-    record: Record, quantity: str, norm: str = TYPICAL_NORM
-) -> tuple[Floats, Floats, Floats]:
-    """Return the order of every scheme and member, stated or estimated, and the ends of its interval."""
-    order, low, high = (
-        # a large sweep has orders only for the quantities of checks
-        optional(record, f"{quantity}_order{end}", MEMBER, norm=norm_index(record, norm))
-        for end in ("", "_low", "_high")
-    )
-    return order, low, high
-
-
-def stated_orders(
-    record: Record, quantity: str, norm: str = TYPICAL_NORM
-) -> tuple[Floats, Floats, Floats]:
-    """Return the stated order of every scheme and member and the ends of its interval, shape (scheme, case).
-
-    All are NaN where the verdict is undecided, as in `data.stated_order`.
-    """
-    undecided = data.is_undecided(record, quantity)
-    order, low, high = (
-        np.where(undecided, np.nan, part) for part in orders(record, quantity, norm)
-    )
-    return order, low, high
-
-
 def deviation(record: Record, quantity: str) -> Floats:
     """Return the order, stated or estimated, minus the formal one, shape (scheme, case)."""
-    return np.asarray(orders(record, quantity)[0] - formal_orders(record, quantity))
+    return np.asarray(data.orders(record, quantity)[0] - formal_orders(record, quantity))
 
 
 def _error_fraction(record: Record, order: Floats) -> Floats:

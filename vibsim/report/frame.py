@@ -67,8 +67,7 @@ def why_lost(
     pairs = [i for i in levels if i < len(data.whole(record, "pair"))]
     if not pairs:
         return NO_VALUE
-    name = f"{quantity}_difference_norm"
-    difference = float(data.at(record, name, member, norm=data.norm_index(record))[pairs[-1]])
+    difference = float(data.at(record, f"{quantity}_difference_norm", member)[pairs[-1]])
     floor = data.floor_norm(record, quantity, member, TYPICAL_NORM)
     if math.isnan(difference):
         return NO_VALUE

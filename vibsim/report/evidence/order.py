@@ -23,9 +23,8 @@ def picture(
 ) -> Picture | None:
     """Draw the rescaled differences over time, if series are stored, and the order by level."""
     quantity = check.converges
-    norm = data.norm_index(record, check.norm)
     orders = f"{quantity}_observed_order"
-    if orders not in record or not np.isfinite(at(record, orders, member, norm=norm)).any():
+    if orders not in record or not np.isfinite(at(record, orders, member, check.norm)).any():
         return None
     alt = f"Evidence on the order of {words.name(quantity)}"
     right_text = (
@@ -36,7 +35,7 @@ def picture(
     has_series = f"{quantity}_rescaled" in record
     if has_series:
         _draw_differences(figure, record, quantity, member)
-    _draw_orders(figure, record, check, member, norm)
+    _draw_orders(figure, record, check, member)
     if not has_series:
         return evidence(f"{member.title}: {right_text}", alt, figure)
     order = data.rescaling_order(record, member, quantity)
@@ -62,12 +61,10 @@ def _draw_differences(figure: Figure, record: Record, quantity: str, member: Mem
         ax.plot(*style.thin(t, curve.values, 120), label=curve.label, **look)
 
 
-def _draw_orders(
-    figure: Figure, record: Record, check: ConvergesCheck, member: Member, norm: int
-) -> None:
+def _draw_orders(figure: Figure, record: Record, check: ConvergesCheck, member: Member) -> None:
     """Draw the order of every triple of levels, the expected order, and the stated one."""
     quantity = check.converges
-    orders = at(record, f"{quantity}_observed_order", member, norm=norm)
+    orders = at(record, f"{quantity}_observed_order", member, check.norm)
     formal = data.formal_order(record, member, quantity)
     expected = float(formal if check.order == "scheme" else check.order)
     triples, levels = data.whole(record, "triple"), data.whole(record, "level")
@@ -82,10 +79,10 @@ def _draw_orders(
         frame.allowed(ax, expected - check.tolerance, expected + check.tolerance)
         ax.axhline(expected, **frame.DASHED)
     # the data have the verdict on the scheme's order; an order of its own has another one
-    stated = math.isfinite(data.stated_order(record, quantity, member, norm)[0])
+    stated = math.isfinite(data.stated_order(record, quantity, member, check.norm)[0])
     is_stated = stated or check.order != "scheme"
     counts = [
         is_stated and first <= triple and levels[i + 2] <= last for i, triple in enumerate(triples)
     ]
     frame.points(ax, triples, orders, counts)
-    draw_stated(ax, record, quantity, member, norm, frame.COLOUR)
+    draw_stated(ax, record, quantity, member, frame.COLOUR, check.norm)

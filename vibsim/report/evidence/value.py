@@ -15,10 +15,10 @@ from vibsim.checks.number_units import unit_of, unit_of_norm
 from vibsim.checks.value_text import what
 from vibsim.core.array_types import Floats
 from vibsim.core.record import Record
-from vibsim.core.vocabulary import OF_LEVEL, TYPICAL_NORM
+from vibsim.core.vocabulary import OF_LEVEL
 from vibsim.experiment.value_names import OF_ONE_MEMBER
 from vibsim.report import style, words
-from vibsim.report.data import Member, at, norm_index, norm_unit, pretty_unit, unit, whole
+from vibsim.report.data import Member, at, norm_unit, pretty_unit, unit, whole
 from vibsim.report.evidence import frame
 from vibsim.report.evidence.frame import evidence, measured
 from vibsim.report.style import Picture
@@ -99,8 +99,7 @@ def _values(
     norm, errors = check.value.removeprefix("error_"), f"{check.quantity}_error_norm"
     if norm == check.value or errors not in record or norm not in record.words("norm"):
         return None
-    error = at(record, errors, member, norm=norm_index(record, norm))
-    return error, norm_unit(record, str(check.quantity), norm)
+    return at(record, errors, member, norm), norm_unit(record, str(check.quantity), norm)
 
 
 @dataclass(frozen=True)
@@ -163,7 +162,7 @@ def of_error(
     errors = np.full(len(levels), np.nan)
     norms = f"{check.accurate}_error_norm"
     if norms in record:
-        errors = np.array(at(record, norms, member, norm=norm_index(record, TYPICAL_NORM)))
+        errors = np.array(at(record, norms, member))
     errors[-1] = error
     if not (np.isfinite(bound) and error > 0.0 and scale > 0.0):
         return None

@@ -162,8 +162,7 @@ def against_step(record: Record, lead: Lead) -> Picture | None:
             ax.plot(dt, true, **ring, label="true" if alone else of_scheme)
             drawn.append(true)
             notes["Rings: the true error."] = None
-        norm = data.norm_index(record, lead.norm)
-        has_order = math.isfinite(data.stated_order(record, quantity, member, norm)[0])
+        has_order = math.isfinite(data.stated_order(record, quantity, member, lead.norm)[0])
         is_lead_on_order = is_lead and lead.is_on_order and lead.result.get("reason") != "exact"
         order = data.formal_order(record, member, quantity)
         if (has_order or is_lead_on_order) and order not in slopes:
@@ -232,21 +231,19 @@ def solution(
     )  # fmt: skip
 
 
-def _errors(record: Record, quantity: str, member: Member, name: str) -> tuple[Floats, Floats]:
+def _errors(record: Record, quantity: str, member: Member, norm: str) -> tuple[Floats, Floats]:
     """Return the estimated and the true error of every level in a norm, shape (level,); NaN if unknown.
 
     With the difference d of two levels and the ratio r of their errors, the error of the coarser one is d r/(r - 1), of
     the finer one d/(r - 1).
     """
-    norm, levels = data.norm_index(record, name), data.whole(record, "level")
-    true = data.optional(
-        record, f"{quantity}_error_norm", ("level",), scheme=member.scheme, case=member.case, norm=norm
-    )  # fmt: skip
+    levels, place = data.whole(record, "level"), {"scheme": member.scheme, "case": member.case}
+    true = data.optional(record, f"{quantity}_error_norm", ("level",), norm, **place)
     estimate = np.full(len(levels), np.nan)
     if data.whole(record, "pair"):
-        gap = data.at(record, f"{quantity}_difference_norm", member, norm=norm)
+        gap = data.at(record, f"{quantity}_difference_norm", member, norm)
         # stated or estimated: both give the estimate that the tables have
-        order = float(data.at(record, f"{quantity}_order", member, norm=norm))
+        order = float(data.at(record, f"{quantity}_order", member, norm))
         order = order if math.isfinite(order) else data.formal_order(record, member, quantity)
         if math.isfinite(order) and order > 0.0:
             rest = 2.0 ** (order * np.diff(levels)) - 1.0
@@ -411,9 +408,7 @@ def orders(experiment: Experiment, record: Record, lead: Lead) -> Picture | None
     keys, quantity, scheme = sweep_layout.keys(record), lead.quantity, lead.member.scheme
     if not keys or not data.whole(record, "triple"):
         return None
-    order, low, high = (
-        part[scheme] for part in finest_level.stated_orders(record, quantity, lead.norm)
-    )
+    order, low, high = (part[scheme] for part in data.stated_orders(record, quantity, lead.norm))
     known = np.isfinite(order)
     if not known.any():
         return None

@@ -79,7 +79,7 @@ def _draw_norms(
     ax: Axes, experiment: Experiment, record: Record, quantity: str, members: list[Member]
 ) -> set[str]:
     """Draw the norms; return the visible parts, of ``difference``, ``true``, ``slope``, ``floor``."""
-    dt, norm = data.steps_of(record, members[0].case), data.norm_index(record)
+    dt = data.steps_of(record, members[0].case)
     kinds: dict[str, list[Floats]] = {"difference": [], "true": [], "floor": []}
     for member in members:
         if np.isnan(data.formal_order(record, member, quantity)):
@@ -87,7 +87,7 @@ def _draw_norms(
             continue
         look = style.look(member.scheme)
         difference, true = (
-            style.no_zeros(data.at(record, f"{quantity}_{name}_norm", member, norm=norm))
+            style.no_zeros(data.at(record, f"{quantity}_{name}_norm", member))
             for name in ("difference", "error")
         )
         floor = style.no_zeros(data.floor_norm(record, quantity, member, TYPICAL_NORM))
@@ -203,7 +203,7 @@ def _draw_by_level(
     """Draw the local orders; return whether an order is stated."""
     from matplotlib.ticker import MaxNLocator
 
-    triples, norm = data.whole(record, "triple"), data.norm_index(record)
+    triples = data.whole(record, "triple")
     promised = promises(experiment, record, quantity)
     for order, tolerance in promised:
         ax.axhspan(order - tolerance, order + tolerance, **style.ALLOWED)
@@ -216,10 +216,10 @@ def _draw_by_level(
             # orders of noise could be mistaken for orders
             continue
         look = style.look(member.scheme)
-        local = data.at(record, f"{quantity}_observed_order", member, norm=norm)
+        local = data.at(record, f"{quantity}_observed_order", member)
         sound.append(local[above] if any(above) else local)
         ax.plot(triples, local, **look, markersize=5, linewidth=1.1)
-        stated |= draw_stated(ax, record, quantity, member, norm, look["color"])
+        stated |= draw_stated(ax, record, quantity, member, look["color"])
     ax.set_ylim(*_order_limits(style.finite(*sound), [order for order, _ in promised]))
     if len(members) == 1 and len(triples) <= 8:
         offset: Any = {"xytext": (0, 7), "textcoords": "offset points", "ha": "center"}
@@ -239,14 +239,14 @@ def _draw_each(
     ax: Axes, experiment: Experiment, record: Record, quantity: str, members: list[Member]
 ) -> bool:
     """Draw the stated order of every scheme in its own row; return whether any is stated."""
-    norm, orders, stated = data.norm_index(record), list[float](), False
+    orders, stated = list[float](), False
     members = [m for m in members if not np.isnan(data.formal_order(record, m, quantity))]
     for row, member in enumerate(members):
         look, promised = style.look(member.scheme), data.formal_order(record, member, quantity)
-        order, low, high = data.stated_order(record, quantity, member, norm)
+        order, low, high = data.stated_order(record, quantity, member)
         is_stated = bool(np.isfinite(order))
         stated |= is_stated
-        last = data.at(record, f"{quantity}_observed_order", member, norm=norm)[-1]
+        last = data.at(record, f"{quantity}_observed_order", member)[-1]
         value, face = (order, look["color"]) if is_stated else (float(last), "white")
         ax.plot([low, high], [row, row], color=look["color"], linewidth=3.0, alpha=0.35)
         ax.plot([value], [row], **look | {"markerfacecolor": face, "markersize": 5})
@@ -262,7 +262,7 @@ def _draw_each(
 
 
 def draw_stated(
-    ax: Axes, record: Record, quantity: str, member: Member, norm: int, colour: str
+    ax: Axes, record: Record, quantity: str, member: Member, colour: str, norm: str = TYPICAL_NORM
 ) -> bool:
     """Draw the stated order as a bar over the levels of its window, with its interval; return whether there is one."""
     order, low, high = data.stated_order(record, quantity, member, norm)

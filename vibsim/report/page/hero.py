@@ -178,13 +178,12 @@ def _order(experiment: Experiment, record: Record, lead: Lead) -> Iterator[Numbe
     if lead.is_on_order:
         order, low, high = (lead.facts.get(f"order{end}") for end in ("", "_low", "_high"))
     else:
-        norm = data.norm_index(record, lead.norm)
-        order, low, high = data.stated_order(record, quantity, member, norm)
+        order, low, high = data.stated_order(record, quantity, member, lead.norm)
         formal, scheme = data.formal_order(record, member, quantity), record.words("scheme")
         misses = not low - ORDER_TOLERANCE <= formal <= high + ORDER_TOLERANCE
         if due and misses and not choice.on_order(experiment, quantity, scheme[member.scheme]):
             unasked = ", which no check asks for"
-    orders = finest_level.stated_orders(record, quantity, lead.norm)[0][member.scheme]
+    orders = data.stated_orders(record, quantity, lead.norm)[0][member.scheme]
     shown = about_members(record, lead.measured if lead.is_on_order else None)
     every = style.finite(orders[shown])
     if lead.is_on_order and lead.result.get("status") == "INCONCLUSIVE":

@@ -69,14 +69,14 @@ def orders(
     record: Record, quantity: str, shown: Sequence[Member], norm: str = TYPICAL_NORM
 ) -> Table:
     """Return norms, ratios and orders of a quantity, one row per scheme, member and level."""
-    measure, n = data.norm_unit(record, quantity, norm), data.norm_index(record, norm)
+    measure = data.norm_unit(record, quantity, norm)
     letter, pairs = words.symbol(quantity), bool(whole(record, "pair"))
     triples = bool(whole(record, "triple"))
     floors = {member: data.floor_norm(record, quantity, member, norm) for member in shown}
-    notes = {member: _notes(record, quantity, member, n) for member in shown}
+    notes = {member: _notes(record, quantity, member, norm) for member in shown}
 
     def cells(name: str) -> Fill:
-        values = optional(record, f"{quantity}_{name}", (*MEMBER, "level"), norm=n)
+        values = optional(record, f"{quantity}_{name}", (*MEMBER, "level"), norm)
         return lambda m, i: float(values[m.scheme, m.case, i]) if i < values.shape[2] else math.nan
 
     filled = (
@@ -94,11 +94,11 @@ def orders(
     return by_level(record, f"orders_{quantity}_{norm}", caption, shown, filled)
 
 
-def _notes(record: Record, quantity: str, member: Member, norm: int) -> list[str]:
+def _notes(record: Record, quantity: str, member: Member, norm: str) -> list[str]:
     """Return for every level whether the stated order uses the three levels from there on, or why not."""
     levels, (first, last) = whole(record, "level"), data.window(record, quantity, member)
     stated, *_ = data.stated_order(record, quantity, member, norm)
-    orders = optional(record, f"{quantity}_observed_order", (*MEMBER, "level"), norm=norm)
+    orders = optional(record, f"{quantity}_observed_order", (*MEMBER, "level"), norm)
     local = orders[member.scheme, member.case]
     above = data.sound_pairs(record, quantity, member) if len(levels) > 1 else []
     notes = []

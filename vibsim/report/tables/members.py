@@ -16,7 +16,16 @@ from numpy.typing import NDArray
 from vibsim import store
 from vibsim.core.record import Record
 from vibsim.report import finest_level, words
-from vibsim.report.data import exact_periods, flags, norm_unit, swept, swept_label, unit, whole
+from vibsim.report.data import (
+    exact_periods,
+    flags,
+    norm_unit,
+    stated_orders,
+    swept,
+    swept_label,
+    unit,
+    whole,
+)
 from vibsim.report.tables.table import Column, Table, csv_line
 
 LISTED = 10_000
@@ -38,7 +47,7 @@ def fields(record: Record, quantity: str) -> list[Field]:
     time, size = (finest_level.measured(record, name, quantity) for name in ("period", "amplitude"))
     level = whole(record, "level")[-1]
     names = [f"order of {words.symbol(quantity)}", "order, low", "order, high"]
-    orders = zip(names, finest_level.stated_orders(record, quantity), strict=True)
+    orders = zip(names, stated_orders(record, quantity), strict=True)
     listed: list[Field] = [
         (Column("case", form="integer"), np.asarray(record["case"])),
         *((Column(*swept_label(record, name), "step"), record[name]) for name in swept(record)),

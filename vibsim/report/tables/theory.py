@@ -14,7 +14,7 @@ import numpy as np
 from vibsim.core.array_types import Floats
 from vibsim.core.record import Record
 from vibsim.core.vocabulary import MEMBER, OF_LEVEL, PEAKS
-from vibsim.report import choice, data, finest_level, words
+from vibsim.report import choice, data, words
 from vibsim.report.data import Member, optional, swept, whole
 from vibsim.report.tables.levels import Fill, by_level
 from vibsim.report.tables.table import Cell, Column, Table, Written
@@ -76,7 +76,7 @@ def _scheme(
     yield limit
     for quantity in quantities:
         formal = data.formal_orders(record, quantity)[s]
-        value, low, high = (part[s] for part in finest_level.stated_orders(record, quantity))
+        value, low, high = (part[s] for part in data.stated_orders(record, quantity))
         with np.errstate(invalid="ignore"):
             away = np.abs(value - formal)
         case = int(np.argmax(np.where(np.isfinite(away), away, -1.0)))

@@ -364,9 +364,8 @@ def paragraph(experiment: Experiment, record: Record, lead: Lead, levels: int) -
 
 def _growing_error(record: Record, lead: Lead) -> str:
     """Say from which level on finer ones have a larger true error; empty if none do, or it is unknown."""
-    norm, member = data.norm_index(record, lead.norm), lead.member
     name = f"{lead.quantity}_error_norm"
-    error = data.at(record, name, member, norm=norm) if name in record else np.empty(0)
+    error = data.at(record, name, lead.member, lead.norm) if name in record else np.empty(0)
     if not error.size or not np.isfinite(error).all() or not 0.0 < GROWN * error.min() <= error[-1]:
         return ""
     level = data.whole(record, "level")[int(np.argmin(error))]

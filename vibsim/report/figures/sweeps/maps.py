@@ -131,7 +131,7 @@ def _order(experiment: Experiment, record: Record, quantity: str, scheme: int) -
     if not data.whole(record, "triple"):
         return
     allowed = tolerance(experiment, quantity, record.words("scheme")[scheme])
-    order, low, high = (part[scheme] for part in finest_level.stated_orders(record, quantity))
+    order, low, high = (part[scheme] for part in data.stated_orders(record, quantity))
     away = order - data.formal_orders(record, quantity)[scheme]
     yield Map(
         f"{quantity}_order", f"order of {letter}", quantity, away,

@@ -77,7 +77,7 @@ class _Projection:
         """Yield the order, stated or estimated, minus the formal one."""
         record, quantity = self.record, self.quantity
         name = f"order of {words.symbol(quantity)}"
-        order = finest_level.orders(record, quantity)[0]
+        order = data.orders(record, quantity)[0]
         away = finest_level.deviation(record, quantity)[self.scheme]
         if not np.isfinite(away).any():
             return

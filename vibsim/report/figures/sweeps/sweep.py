@@ -172,7 +172,7 @@ class _Drawing:
     def order(self, quantity: str) -> Iterator[View | str]:
         """Yield the stated order of every member with its interval."""
         record, along, letter = self.record, self.along, words.symbol(quantity)
-        value, low, high = finest_level.stated_orders(record, quantity)
+        value, low, high = data.stated_orders(record, quantity)
         basis = data.basis_of_order(record, quantity)
 
         def draw(ax: Axes) -> str:
