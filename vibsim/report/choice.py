@@ -160,7 +160,8 @@ class Lead:
     @property
     def facts(self) -> Mapping[str, Any]:
         """The facts of the worst result."""
-        return self.result.get("facts") or {}
+        facts: Mapping[str, Any] = self.result.get("facts", {})
+        return facts
 
     @property
     def is_on_order(self) -> bool:
@@ -203,16 +204,13 @@ def find_lead(experiment: Experiment, record: Record, summary: Mapping[str, Any]
             demotion = 3 if kind == "equal" else 2
         return -SEVERITY[entry["status"]], is_trap(check), demotion
 
-    listed = [entry for entry in summary["checks"] if entry.get("results")]
-    if not listed:
+    if not summary["checks"]:
         return Lead(default, data.of_case(record, 0)[0])
-    entry = min(listed, key=rank)
+    entry = min(summary["checks"], key=rank)
     check = asserted.get(entry["id"])
     name = str(entry.get("quantity") or default)
     is_compared = any(f"{name}_{kind}_norm" in record for kind in ("difference", "error"))
     quantity = name if is_compared else default
     result = entry["results"][0]
-    candidates = data.of_case(record, data.case_position(record, result.get("case", -1)) or 0)
-    scheme = result.get("scheme")
-    member = next((m for m in candidates if m.scheme_name == scheme), candidates[0])
+    member = data.of_result(record, result) or data.of_case(record, 0)[0]
     return Lead(quantity, member, entry, check)

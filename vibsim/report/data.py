@@ -7,6 +7,7 @@ not depend on the scheme).
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -235,6 +236,14 @@ def of_case(record: Record, case: int, role: str = "") -> list[Member]:
     """Return one member of the sweep with each scheme."""
     name = case_name(record, case)
     return [Member(s, case, scheme, name, role) for s, scheme in enumerate(record.words("scheme"))]
+
+
+def of_result(record: Record, result: Mapping[str, Any]) -> Member | None:
+    """Return the member and scheme of a result in a summary; None if the result is of all members or schemes."""
+    case, schemes = case_position(record, result["case"]), record.words("scheme")
+    if case is None or result["scheme"] not in schemes:
+        return None
+    return of_case(record, case)[schemes.index(result["scheme"])]
 
 
 def case_position(record: Record, case: int) -> int | None:

@@ -6,7 +6,7 @@ show the decisive numbers of all members instead.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from dataclasses import replace
 from typing import Any
 
@@ -16,8 +16,8 @@ from vibsim.checks.fields import name_of
 from vibsim.core.array_types import Floats
 from vibsim.core.record import Record
 from vibsim.core.vocabulary import DECISIVE
-from vibsim.report import style, sweep_layout, words
-from vibsim.report.data import Member, case_position, is_lean, of_case, pick, unit
+from vibsim.report import data, style, sweep_layout, words
+from vibsim.report.data import Member, is_lean, pick, unit
 from vibsim.report.evidence import energy, equal, frame, order, stable, value
 from vibsim.report.evidence.frame import GrowthScale, evidence, usable
 from vibsim.report.style import Picture
@@ -38,8 +38,7 @@ def picture(
     experiment: Experiment, record: Record, asserted: Check | None, check: Mapping[str, Any]
 ) -> Picture | None:
     """Return the picture of the decisive result of a check; None if there is nothing to draw."""
-    results: Sequence[Mapping[str, Any]] = check.get("results") or []
-    member = _member(record, results[0]) if results else None
+    member = data.of_result(record, check["results"][0])
     if asserted is None or member is None:
         return None
     measured, name = asserted.measured, asserted.id
@@ -49,12 +48,6 @@ def picture(
     with style.applied():
         drawn = draw(experiment, record, measured, name, member)
     return drawn and replace(drawn, name=f"evidence_{name}")
-
-
-def _member(record: Record, result: Mapping[str, Any]) -> Member | None:
-    case = case_position(record, result.get("case", -1))
-    candidates = [] if case is None else of_case(record, case)
-    return next((m for m in candidates if m.scheme_name == result.get("scheme")), None)
 
 
 def _of_members(

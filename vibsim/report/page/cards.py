@@ -168,7 +168,7 @@ def _got(check: Mapping[str, Any], wording: Wording, result: Result) -> str:
         return (
             f"{text}: its interval overlaps the band" if _is_beside(wording.check, check) else text
         )
-    if check["kind"] == "converges" or "order" in (decisive.get("facts") or {}):
+    if check["kind"] == "converges" or "order" in decisive["facts"]:
         return reasons.OUTCOMES.get(result.reason, str(result.reason))
     return wording.brief(result)
 
@@ -189,7 +189,7 @@ def _results(record: Record, check: Mapping[str, Any], unit: str) -> tuple[Any, 
     table, counts = check_tables.results(record, check, unit), check["counts"]
     total = sum(counts.values())
     # the table of checks has the hardest result of a passed check
-    if table is None or total < 2 or check["status"] == "PASS":
+    if total < 2 or check["status"] == "PASS":
         return None, ""
     counted = ", ".join(f"{n} {word}" for word, n in counts.items() if n)
     listed = len(table.rows)

@@ -56,15 +56,10 @@ def context(
         "marks": words.marks(summary["checks"]),
         "facts": " · ".join(filter(None, _facts(experiment, record))),
         "numbers": list(numbers(experiment, record, lead))[:MOST_NUMBERS],
-        "meaning": " ".join(
-            filter(
-                None,
-                [
-                    findings.paragraph(experiment, record, lead, levels),
-                    findings.asked_of(record, lead),
-                    *_traps(summary, lead),
-                ],
-            )
+        "meaning": style.sentences(
+            findings.paragraph(experiment, record, lead, levels),
+            findings.asked_of(record, lead),
+            *_traps(summary, lead),
         ),
         "statements": claims[:MOST_STATEMENTS],
         "more_statements": max(0, len(claims) - MOST_STATEMENTS),
@@ -86,11 +81,10 @@ def _statements(
 def _traps(summary: Mapping[str, Any], lead: Lead) -> Iterator[str]:
     """Yield a sentence on the order that each trap found, unless the page is on this trap."""
     for check in summary["checks"]:
-        result: Mapping[str, Any] = next(iter(check["results"] or []), {})
+        result = check["results"][0]
         # any other order is an estimate that may be an accident
-        order = (
-            words.fact(result, "order") if result.get("reason") in findings.WITH_AN_ORDER else None
-        )
+        has_order = result["reason"] in findings.WITH_AN_ORDER
+        order = words.fact(result, "order") if has_order else None
         if words.badge(check) == words.TRAP and check is not lead.entry and order is not None:
             scheme, letter = result["scheme"], words.title(check["quantity"])
             yield f"As the trap expects, {letter} has order {words.number(order, 'order')} with scheme {scheme}."

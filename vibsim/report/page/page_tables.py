@@ -55,7 +55,7 @@ def collect(
     every = [*printed, *listed, *others, scales, checks.checks(summary), broken]
     every += [source_figures.table(sources), everyone]
     texts = texts_of(table for table in every if table is not None)
-    failures, count = words.broken(summary), len(summary.get("failures") or [])
+    failures, count = words.broken(summary), len(summary["failures"])
     return texts, {
         "failures": broken and cut(broken),
         "unlisted": f"{failures} runs broke down; the first {count} are listed." * (failures > count),

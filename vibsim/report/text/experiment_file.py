@@ -171,7 +171,7 @@ def change(experiment: Experiment, measured: Measurement | None, check: Mapping[
     if check["status"] == "PASS" or measured is None or experiment.tolerance is not None:
         return ""
     result = check["results"][0]
-    facts, reason = result.get("facts") or {}, result.get("reason")
+    facts, reason = result["facts"], result["reason"]
     spec = next((spec for spec in experiment.schemes if spec.name == result["scheme"]), None)
     if reason == "order_low" and spec is not None and spec.options.get("start") in LOW_STARTS:
         return "\n".join(schemes(experiment, spec.name, start="centred"))

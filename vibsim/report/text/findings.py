@@ -386,15 +386,13 @@ def asked_of(record: Record, lead: Lead) -> str:
 
 def keeps_promise(record: Record, measured: Measurement | None, check: Mapping[str, Any]) -> bool:
     """Return whether the decisive result has the order of its scheme although the check states an order of its own."""
-    decisive: Mapping[str, Any] = next(iter(check.get("results") or []), {})
-    order = words.fact(decisive, "order")
-    case = data.case_position(record, decisive.get("case", -1))
+    decisive = check["results"][0]
+    order, member = words.fact(decisive, "order"), data.of_result(record, decisive)
     if measured is None or measured.kind != "converges" or measured.order == "scheme":
         return False
-    if order is None or case is None:
+    if order is None or member is None:
         return False
-    promised = data.formal_orders(record, measured.converges)
-    formal = promised[record.words("scheme").index(decisive["scheme"]), case]
+    formal = data.formal_order(record, member, measured.converges)
     is_promised = data.basis_of_order(record, measured.converges) == "promised"
     return bool(is_promised and abs(formal - order) <= measured.tolerance)
 
