@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
+from operator import itemgetter
 from pathlib import Path
 from typing import Any
 
@@ -21,7 +22,7 @@ from vibsim.report.page.page import replace_files
 from vibsim.report.page.page_tables import files_of, texts_of
 from vibsim.report.page.templates import environment, sealed
 from vibsim.report.tables import checks as check_tables
-from vibsim.report.tables.table import Cell, Column, Table
+from vibsim.report.tables.table import Column, Filled, Table, filled, keyed
 from vibsim.report.text.setting import not_in_file
 from vibsim.report.types import Plan
 from vibsim.solver import analysis
@@ -89,26 +90,24 @@ def _card(
 def _members(entry: Mapping[str, Any]) -> Table:
     """Return the table of the members in the summary, the worst first."""
     results = entry["results"]
-    names = list(results[0]["values"])
     forms = {"order": "order", "error": "small", "error_bound": "small", "best": "full"}
-    facts = [name for name in forms if name in results[0]["facts"]]
-    columns = (
-        Column("member", form="integer"),
-        *(Column(name, form="text") for name in names),
-        Column("measured"),
-        Column("reason"),
-        *(Column(name.replace("_", " "), form=forms[name]) for name in facts),
-    )
 
-    def cells(result: Mapping[str, Any]) -> Iterator[Cell]:
-        yield result["case"]
-        yield from (str(result["values"][name]) for name in names)
-        yield from (result["status"], result["reason"])
-        yield from (words.fact(result, name) for name in facts)
+    def value(name: str) -> Filled:
+        return Column(name), lambda result: str(result["values"][name])
 
-    rows = tuple(tuple(cells(result)) for result in results)
-    caption = f"Members, the worst first: {len(rows)} of {sum(entry['counts'].values())}"
-    return Table(f"members_{entry['id']}", caption, columns, rows)
+    def fact(name: str) -> Filled:
+        column = Column(name.replace("_", " "), form=forms[name])
+        return column, lambda result: words.fact(result, name)
+
+    columns: list[Filled] = [
+        (Column("member", form="integer"), itemgetter("case")),
+        *map(value, results[0]["values"]),
+        (Column("measured"), itemgetter("status")),
+        keyed("reason"),
+        *(fact(name) for name in forms if name in results[0]["facts"]),
+    ]
+    caption = f"Members, the worst first: {len(results)} of {sum(entry['counts'].values())}"
+    return filled(f"members_{entry['id']}", caption, columns, results)
 
 
 def _thumbnail(verdict: LadderVerdict) -> Iterator[tuple[str, bytes]]:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Mapping, Sequence
+from operator import attrgetter
 from pathlib import Path
 from typing import Any
 
@@ -16,7 +17,7 @@ from vibsim.report import style, words
 from vibsim.report.page.templates import environment, sealed
 from vibsim.report.style import Picture
 from vibsim.report.tables.best import rounded
-from vibsim.report.tables.table import Column, Table, Written
+from vibsim.report.tables.table import Column, Filled, Table, Written, filled
 from vibsim.report.text import findings
 
 UNSEEN = (
@@ -150,26 +151,23 @@ def card(name: str, verdict: LadderVerdict, expected: str, files: Sequence[str])
 def _table(verdict: LadderVerdict) -> Table:
     """Return the table of levels."""
     value = "value" if verdict.is_number else "norm"
-    columns = (
-        Column(verdict.size_name, form="step"),
-        Column(value, form="full"),
-        Column("error" if verdict.is_exact_known else "estimated error", form="small"),
-        Column("difference", form="small"),
-        Column("ratio", form="norm"),
-        Column("order", form="order"),
-    )
     digits = digits_of_values(row.value for row in verdict.levels) if verdict.is_number else 4
-    rows = tuple(
-        (row.h, _value(row.value, digits), row.error, row.difference, row.ratio, row.order)
-        for row in verdict.levels
-    )
+    error = "error" if verdict.is_exact_known else "estimated error"
+    columns: list[Filled] = [
+        (Column(verdict.size_name, form="step"), attrgetter("h")),
+        (Column(value, form="full"), lambda row: _value(row.value, digits)),
+        (Column(error, form="small"), attrgetter("error")),
+        (Column("difference", form="small"), attrgetter("difference")),
+        (Column("ratio", form="norm"), attrgetter("ratio")),
+        (Column("order", form="order"), attrgetter("order")),
+    ]
     caption = (
         "Levels, the coarsest first. The difference is that to the next finer level, the ratio is this difference over "
         "the next one, and the order follows from the ratio and the step sizes."
     )
     if not verdict.is_number:
         caption += " Norms are root mean squares over the common points."
-    return Table("levels", caption, columns, rows)
+    return filled("levels", caption, columns, verdict.levels)
 
 
 def _value(value: float | None, digits: int) -> Written | None:

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Mapping
+from operator import itemgetter
 from typing import Any
 
 from vibsim.core.record import Record
 from vibsim.report import data, words
-from vibsim.report.tables.table import Cell, Column, Table, Written
+from vibsim.report.tables.table import Cell, Column, Filled, Table, Written, filled, keyed
 
 ROUND_OFF = 1e-12  # numbers up to this have two digits: more would be noise
 
@@ -26,47 +27,36 @@ def checks(summary: Mapping[str, Any]) -> Table:
     rows = tuple(
         (*map(check.get, of_check), *map(result.get, of_result), *words.measured(result))
         for check in summary["checks"]
-        for result in check.get("results") or [{}]
+        for result in check["results"]
     )
     return Table("checks", "Checks: expected and measured", columns, rows)
 
 
-def results(record: Record, check: Mapping[str, Any], unit: str) -> Table | None:
+def results(record: Record, check: Mapping[str, Any], unit: str) -> Table:
     """Return the table of the results of one check; `unit` is that of its numbers."""
-    listed: Sequence[Mapping[str, Any]] = check.get("results") or []
-    if not listed:
-        return None
-    has_order = check.get("kind") == "converges" or any(
-        words.fact(result, "order") is not None for result in listed
-    )
-    has_value = any(words.number_of(result) is not None for result in listed)
-    columns = [Column("scheme")]
-    columns += [Column("case", form="integer"), Column("member")] if data.swept(record) else []
-    columns += [Column("measured"), Column("reason")]
-    columns += (
-        [Column("order", form="order"), Column("interval"), Column("levels")] if has_order else []
-    )
-    # differences and errors need few digits, a number of a value check may need many
-    form = "small" if check.get("kind") in ("equal", "accurate") else "value"
-    columns += [Column("value", unit, form)] if has_value else []
+    listed, kind = check["results"], check["kind"]
+    columns: list[Filled] = [keyed("scheme")]
+    if data.swept(record):
+        columns += [keyed("case", form="integer")]
+        columns += [(Column("member"), lambda result: member(record, result["case"]) or "all")]
+    columns += [(Column("measured"), itemgetter("status")), keyed("reason")]
+    if kind == "converges" or any(words.fact(result, "order") is not None for result in listed):
+        columns += [
+            (Column("order", form="order"), lambda result: words.fact(result, "order")),
+            (Column("interval"), lambda result: words.interval(words.interval_of(result))),
+            (Column("levels"), lambda result: words.levels(words.levels_of(result))),
+        ]
+    if any(words.number_of(result) is not None for result in listed):
+        # differences and errors need few digits, a number of a value check may need many
+        form = "small" if kind in ("equal", "accurate") else "value"
+        columns += [(Column("value", unit, form), _value)]
+    return filled(f"results_{check['id']}", "Measured", columns, listed)
 
-    def cells(result: Mapping[str, Any]) -> Iterator[Cell]:
-        yield result.get("scheme")
-        if data.swept(record):
-            yield result.get("case")
-            yield member(record, result.get("case", -1)) or "all"
-        yield from (result.get("status"), result.get("reason"))
-        if has_order:
-            yield words.fact(result, "order")
-            yield words.interval(words.interval_of(result))
-            yield words.levels(words.levels_of(result))
-        if has_value:
-            value = words.number_of(result)
-            is_noise = value is not None and 0.0 < abs(value) <= ROUND_OFF
-            yield Written(value, words.number(value, "brief")) if is_noise and value else value
 
-    rows = tuple(tuple(cells(result)) for result in listed)
-    return Table(f"results_{check['id']}", "Measured", tuple(columns), rows)
+def _value(result: Mapping[str, Any]) -> Cell:
+    value = words.number_of(result)
+    is_noise = value is not None and 0.0 < abs(value) <= ROUND_OFF
+    return Written(value, words.number(value, "brief")) if is_noise and value else value
 
 
 def member(record: Record, case: int) -> str:
@@ -77,15 +67,12 @@ def member(record: Record, case: int) -> str:
 
 def failures(summary: Mapping[str, Any], record: Record) -> Table | None:
     """Return the runs that broke down; None if there are none."""
-    listed: Iterable[Mapping[str, Any]] = summary.get("failures") or []
-    if not listed:
+    if not summary["failures"]:
         return None
-    columns = (
-        Column("scheme"), Column("level", form="integer"), Column("case", form="integer"), Column("member"),
-        Column("t", data.time_unit(record), "step"), Column("step", form="integer"), Column("error"),
-    )  # fmt: skip
-    keys = ("scheme", "level", "case", "member", "t", "step", "error")
-    with_names = [{**row, "member": member(record, row["case"])} for row in listed]
-    rows = tuple(tuple(row[key] for key in keys) for row in with_names)
+    columns: list[Filled] = [
+        keyed("scheme"), keyed("level", form="integer"), keyed("case", form="integer"),
+        (Column("member"), lambda row: member(record, row["case"])),
+        keyed("t", data.time_unit(record), "step"), keyed("step", form="integer"), keyed("error"),
+    ]  # fmt: skip
     caption = "Runs that broke down: the first moment at which the solution was not finite"
-    return Table("failures", caption, columns, rows)
+    return filled("failures", caption, columns, summary["failures"])

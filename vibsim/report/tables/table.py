@@ -5,8 +5,10 @@ from __future__ import annotations
 import csv
 import io
 import math
-from collections.abc import Collection, Iterator, Sequence
+from collections.abc import Callable, Collection, Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
+from operator import itemgetter
+from typing import Any
 
 from vibsim.report import words
 
@@ -85,6 +87,23 @@ class Table:
         nonzero = [size for size in sizes if 0 < size < math.inf]
         needs_power = nonzero and not 0.1 <= min(nonzero) <= max(nonzero) < 1e4
         return "small" if form == "norm" and needs_power else form
+
+
+Filled = tuple[Column, Callable[[Any], Cell]]
+"""A column, and the function that returns its cell for the object of a row."""
+
+
+def keyed(key: str, unit: str = "", form: str = "text") -> Filled:
+    """Return a column of the values of a key of the objects, under its name."""
+    return Column(key, unit, form), itemgetter(key)
+
+
+def filled(
+    name: str, caption: str, columns: Sequence[Filled], objects: Iterable[Any], heads: int = 0
+) -> Table:
+    """Return a table with a row for each object."""
+    rows = tuple(tuple(fill(one) for _, fill in columns) for one in objects)
+    return Table(name, caption, tuple(column for column, _ in columns), rows, heads)
 
 
 def is_nothing(cell: Cell) -> bool:
