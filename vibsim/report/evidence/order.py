@@ -47,7 +47,7 @@ def picture(
 def _draw_differences(figure: Figure, record: Record, quantity: str, member: Member) -> None:
     """Draw the rescaled differences over time."""
     t, curves = data.times(record, member.case), curves_of_differences(record, quantity, member)
-    shown = [curve for curve in curves if curve.is_whole and curve.sound] or curves
+    shown = [curve for curve in curves if curve.is_readable] or curves
     measure = data.unit(record, f"{quantity}_rescaled")
     title = style.label(f"rescaled differences of {words.symbol(quantity)}", measure)
     ax = frame.panel(figure, title, data.time_label(record))

@@ -95,7 +95,7 @@ def listed(keys: Sequence[Key], count: int, most: int, marked: Iterable[int]) ->
 
 def _view(view: View, cases: NDArray[np.intp]) -> dict[str, Any]:
     def of(values: Floats | None) -> list[Any] | None:
-        return None if values is None else [_numbers(values[s, cases], 5) for s in view.schemes]
+        return None if values is None else [_numbers(row[cases], 5) for row in values]
 
     position = None if view.worst is None else int(np.searchsorted(cases, view.worst))
     return {

@@ -204,8 +204,8 @@ def _view(record: Record, grid: Grid, shown: Map, scheme: int, worst: int) -> Vi
         * bool(grid.separatrix[0].size),
         grid.note,
     )
-    number, is_number = shown.values if shown.number is None else shown.number, shown.kind != "code"
-    values = view.by_scheme(record, scheme, number) if is_number else None
+    number = shown.values if shown.number is None else shown.number
+    values = None if shown.kind == "code" else number[None]
     return View(
         shown.name, Picture(f"map_{shown.stem}_{scheme}", title, text, f"{title} over two swept parameters", figure),
         shown.quantity, values, None, shown.unit, (scheme,), several.removeprefix(", "), ((0, 1),),

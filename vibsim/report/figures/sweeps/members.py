@@ -18,7 +18,7 @@ from vibsim.report import data, finest_level, style, words
 from vibsim.report.choice import tolerance
 from vibsim.report.data import bin_of, flags, norm_unit, of_several, promised_text, whole
 from vibsim.report.figures.panels import rows_of
-from vibsim.report.figures.sweeps.view import View, Worst, by_scheme, key_axis, ring, shared
+from vibsim.report.figures.sweeps.view import View, Worst, key_axis, ring, shared
 from vibsim.report.style import Picture
 from vibsim.report.sweep_layout import Key, bins
 from vibsim.report.types import Axes, Experiment
@@ -77,11 +77,11 @@ class _Projection:
         """Yield the order, stated or estimated, minus the formal one."""
         record, quantity = self.record, self.quantity
         name = f"order of {words.symbol(quantity)}"
-        order = data.orders(record, quantity)[0]
+        order = data.orders(record, quantity)[0][self.scheme]
         away = finest_level.deviation(record, quantity)[self.scheme]
         if not np.isfinite(away).any():
             return
-        if text := shared(name, order[self.scheme], form="order"):
+        if text := shared(name, order, form="order"):
             yield f"{text}{of_several(record, self.scheme)}"
             return
 
@@ -102,9 +102,10 @@ class _Projection:
         from matplotlib.ticker import FuncFormatter, MaxNLocator
 
         error = finest_level.error(self.record, self.quantity)
+        best = error.best[self.scheme]
         unit = norm_unit(self.record, self.quantity)
         name = f"error of {words.symbol(self.quantity)}"
-        size = np.log10(style.positive(error.best[self.scheme]))
+        size = np.log10(style.positive(best))
         if not np.isfinite(size).any():
             return
 
@@ -116,7 +117,7 @@ class _Projection:
 
         explanation = f"Of level {whole(self.record, 'level')[-1]}."
         label = style.label(f"{error.kind} {name}", unit)
-        yield self._view("error", name, label, draw, explanation, error.best, size, unit)
+        yield self._view("error", name, label, draw, explanation, best, size, unit)
 
     def _view(
         self, kind: str, name: str, label: str, draw: Callable[[Axes, Key], None], explanation: str,
@@ -147,8 +148,8 @@ class _Projection:
         title, figure = f"{words.capitalized(name)}{several}", axes[0].get_figure(root=True)
         stem = f"projections_{self.quantity}_{kind}_{self.scheme}"
         return View(
-            name, Picture(stem, title, text, f"{title} against every swept key", figure), self.quantity, values,
-            by_scheme(record, self.scheme, place), unit, schemes=(self.scheme,), of=several.removeprefix(", "),
+            name, Picture(stem, title, text, f"{title} against every swept key", figure), self.quantity, values[None],
+            place[None], unit, schemes=(self.scheme,), of=several.removeprefix(", "),
             panels=tuple((i, None) for i in range(len(axes))), worst=self.worst if any(rings) else None,
         )  # fmt: skip
 

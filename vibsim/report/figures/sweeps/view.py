@@ -35,7 +35,9 @@ class View:
     """Panels with the group id `vibsim.report.style.MEMBER` respond to the pointer."""
     quantity: str = ""
     """The quantity of the verdicts that are shown with a member."""
-    values: Floats | None = None  # shape (scheme, case); None for a verdict, which is shown anyway
+    values: Floats | None = (
+        None  # of `schemes`, shape (scheme, case); None for a verdict, which is shown anyway
+    )
     places: Floats | None = None
     """Vertical positions of the members, of the same shape, if they differ from the values."""
     unit: str = ""
@@ -72,13 +74,6 @@ def of_check(record: Record, name: str, check: ValueCheck) -> Floats:
     """Return the numbers of a check, shape (scheme, case); NaN for schemes that it does not judge."""
     schemes = np.array([check.at.scheme in (None, scheme) for scheme in record.words("scheme")])
     return np.where(schemes[:, None], field_values(record, name, "value"), np.nan)
-
-
-def by_scheme(record: Record, scheme: int, values: Floats) -> Floats:
-    """Return numbers of one scheme in an array of shape (scheme, case); NaN for the others."""
-    table = np.full((len(record["scheme"]), values.size), np.nan)
-    table[scheme] = values
-    return table
 
 
 def shared_verdict(record: Record, quantity: str, scheme: int | None = None) -> str:
