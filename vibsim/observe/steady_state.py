@@ -70,11 +70,14 @@ def harmonic(block: MemberBlock, level: int, quantity: str, back: int = 0) -> Co
 
 
 def section(block: MemberBlock, level: int, quantity: str) -> Floats:
-    """Return a quantity at the beginning of every period of the force (Poincare), shape (scheme, case, period)."""
+    """Return a quantity at the beginning of every period of the force (Poincare), shape (scheme, case, period).
+
+    The end of the run begins no period: a scheme may find its velocity by another formula, with a larger error.
+    """
     n = samples_a_period(block)
     if quantity not in block.records[level] or n == 0:
         return np.full((*block.shape, 0), np.nan)
-    return take(block.grid, block.records[level], quantity)[..., ::n]
+    return take(block.grid, block.records[level], quantity)[..., :-1:n]
 
 
 def is_angle(model: Model, group: Members, position: str) -> Flags:
