@@ -201,8 +201,9 @@ def _by_level_of(f: MemberFacts) -> list[float]:
 
 
 def _is_on_the_mesh(f: MemberFacts, check: ValueCheck) -> bool:
-    """Say whether a number depends on events that are left to the mesh."""
-    return check.number.needs_events and is_on_the_mesh(f.options)
+    """Say whether a number depends on events that are left to the mesh, also on one that it moves across the end."""
+    depends = check.number.needs_events or _is_of_events_at_end(f, check)
+    return depends and is_on_the_mesh(f.options)
 
 
 def _is_of_events_at_end(f: MemberFacts, check: ValueCheck) -> bool:
