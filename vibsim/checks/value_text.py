@@ -281,6 +281,8 @@ def _on_mismatch(f: MemberFacts, check: ValueCheck) -> str:
         return f"Give more `periods:`, if the motion is not steady yet, or c{change}."
     if (first := f.fact("level_as_asked")) > 0:
         return f"Ask for a finer level (`at: {_at(check, first)}`), where the number is as asked, or c{change}."
+    if "tolerance" in f.options:
+        return f"Give scheme {f.scheme_name} a smaller `tolerance:`, or c{change}. Finer levels will not help."
     if f.fact("levels_needed") == SETTLED:
         return f"C{change}, `model:` or `initial:`. Finer levels will not help."
     count = _levels_to_add(f, check)
