@@ -206,6 +206,46 @@ def test_what_is_left_of_a_transient_is_what_its_last_changes_say(
     np.testing.assert_allclose(found, steady_state.REST_SAFETY * 0.1 * 0.6**4, rtol=1e-12)
 
 
+def test_equal_changes_by_rounding_leave_a_steady_motion_its_bound(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """A factor of 1 between two changes would leave an infinite rest, which rounding must not decide."""
+    ulp = 2.0**-53
+
+    def harmonic(block: Any, level: int, quantity: str, back: int = 0) -> Any:
+        return np.array([[0.8 + ulp * back + 0j]])
+
+    monkeypatch.setattr(steady_state, "harmonic", harmonic)
+    noise = np.array([[8.0 * ulp]])
+    found = steady_state.distance(None, 0, "u", noise)  # type: ignore[arg-type]
+    assert found[0, 0] == steady_state.REST_SAFETY * ulp
+    assert np.isinf(steady_state.distance(None, 0, "u"))  # type: ignore[arg-type]
+
+
+def test_a_steady_motion_of_a_response_curve_has_a_bound() -> None:
+    """The changes of its last periods are round-off, two of them equal to the last bit at w = 0.8."""
+    model = {
+        "kind": "oscillator",
+        "spring": "u - 0.1*u**3",
+        "damping": {"linear": 0.2},
+        "force": "F*cos(w*t)",
+        "parameters": {"F": 0.3, "w": 1.0},
+    }
+    limits = {"quantity": "u", "at": {"case": 1, "level": "best"}}
+    experiment = Experiment.from_dict(
+        {
+            **{"title": "x", "model": model, "schemes": ["central"], "levels": [0, 1, 2, 3]},
+            "time": {"periods": 60, "steps_per_period": 16, "frequency": "model.parameters.w"},
+            "sweep": {"model.parameters.w": [0.7, 0.8], "follow": "model.parameters.w"},
+            "checks": [{"value": "steady_amplitude", "equals": 0.87635499, "atol": 1e-6, **limits}],
+        }
+    )
+    levels = [simulate(experiment, level) for level in experiment.levels]
+    (verdict,) = verdicts(experiment, analyse(experiment, levels))
+    assert verdict.status == "PASS"
+    assert "do not prove it" not in verdict.text
+
+
 @pytest.mark.parametrize("damping", [0.0, 0.05, 0.4])
 def test_the_bound_of_a_motion_that_is_not_steady_yet_reaches_the_steady_one(
     damping: float,

@@ -201,8 +201,9 @@ def _by_level_of(f: MemberFacts) -> list[float]:
 
 
 def _is_on_the_mesh(f: MemberFacts, check: ValueCheck) -> bool:
-    """Say whether a number depends on events that are left to the mesh."""
-    return check.number.needs_events and is_on_the_mesh(f.options)
+    """Say whether a number depends on events that are left to the mesh, also on one that it moves across the end."""
+    depends = check.number.needs_events or _is_of_events_at_end(f, check)
+    return depends and is_on_the_mesh(f.options)
 
 
 def _is_of_events_at_end(f: MemberFacts, check: ValueCheck) -> bool:
@@ -280,6 +281,8 @@ def _on_mismatch(f: MemberFacts, check: ValueCheck) -> str:
         return f"Give more `periods:`, if the motion is not steady yet, or c{change}."
     if (first := f.fact("level_as_asked")) > 0:
         return f"Ask for a finer level (`at: {_at(check, first)}`), where the number is as asked, or c{change}."
+    if "tolerance" in f.options:
+        return f"Give scheme {f.scheme_name} a smaller `tolerance:`, or c{change}. Finer levels will not help."
     if f.fact("levels_needed") == SETTLED:
         return f"C{change}, `model:` or `initial:`. Finer levels will not help."
     count = _levels_to_add(f, check)

@@ -187,7 +187,7 @@ def _of_run(name: str, place: value_numbers.Place) -> Floats:
     at = place.block, place.levels[-1], place.quantity
     if name == "peak_frequency":
         return spectrum.error_by_other_lines(*at)
-    left = steady_state.distance(*at)
+    left = steady_state.distance(*at, steady_state.rounding(*at))
     return left if name == "steady_amplitude" else safe_ratio(left, steady_state.amplitude(*at))
 
 

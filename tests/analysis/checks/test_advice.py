@@ -603,3 +603,31 @@ def test_as_many_finer_levels_are_asked_for_as_the_measured_changes_need(kind: s
     # the last three levels decide
     assert judged({**run, "levels": [last - 2, last - 1, last]}).status == "PASS", advice
     assert judged({**run, "levels": [last - 3, last - 2, last - 1]}).status == "FAIL", advice
+
+
+def test_a_number_of_an_adaptive_scheme_asks_for_a_smaller_tolerance() -> None:
+    """Its error comes from the tolerance alone: the model and the exact value are right."""
+    made = Experiment.from_dict(
+        {
+            "title": "x",
+            "model": {"kind": "spring"},
+            "initial": {"u": 1.0},
+            "time": {"end": 20.0},
+            "levels": [4, 5, 6],
+            "schemes": ["rk4", {"kind": "radau", "tolerance": 1e-4}],
+            "checks": [
+                {
+                    "value": "end",
+                    "quantity": "u",
+                    "at": {"scheme": "radau"},
+                    "equals": math.cos(20.0),
+                    "atol": 1e-9,
+                }
+            ],
+        }
+    )
+    (verdict,) = verdicts(made, analyse_records(made, simulated(made)))
+    assert verdict.status == "FAIL"
+    assert verdict.advice.startswith(
+        "Give scheme radau a smaller `tolerance:`, or change `equals:`"
+    )

@@ -297,6 +297,40 @@ def test_the_time_of_an_event_on_the_mesh_is_not_trusted() -> None:
         assert "events: located" in verdict.advice
 
 
+def test_an_event_that_the_mesh_moves_across_the_end_asks_for_located_events() -> None:
+    """Another end would not help: a ball on a moving table has five impacts on three levels, and four on the finest."""
+    data = {
+        "title": "x",
+        "model": {
+            "kind": "oscillator",
+            "spring": "1 + 0*u",
+            "potential": "u",
+            "events": [
+                {
+                    "when": "u - 0.1*sin(3*t)",
+                    "falling": True,
+                    "then": {"v": "0.3*cos(3*t) - 0.6*(v - 0.3*cos(3*t))"},
+                }
+            ],
+        },
+        "initial": {"u": 0.5},
+        "time": {"end": 2.7, "base_steps": 50},
+        "levels": [1, 2, 3, 4],
+        "schemes": [{"kind": "rk4", "label": "mesh", "events": "mesh"}],
+        "checks": [
+            {"value": "end", "quantity": name, "equals": 0.4, "atol": 1e-6}
+            for name in ("dissipated_energy", "v")
+        ],
+    }
+    made = Experiment.from_dict(data)
+    records = [simulate(made, level) for level in made.levels]
+    assert [int(r.event_count[0, 0]) for r in records] == [5, 5, 5, 4]
+    for verdict in verdicts(made, analyse(made, records)):
+        assert verdict.status == "INCONCLUSIVE"
+        assert "because events are left to the mesh" in verdict.text
+        assert verdict.advice == "Set `events: located` for scheme mesh."
+
+
 @pytest.mark.parametrize("kind", thinned(["central", "heun", "gauss4", "ab3", "forward_euler"], 3))
 def test_the_bounds_of_the_times_of_events_hold(kind: str) -> None:
     made = beads([kind], [time_of(k, above=0.0) for k in (1, 2, 3)])

@@ -232,6 +232,23 @@ def test_the_section_of_a_pendulum_that_turns_over_repeats_up_to_whole_turns() -
     assert verdict.status == "PASS"
 
 
+def test_the_velocity_at_the_end_is_no_part_of_a_section() -> None:
+    """`central` extrapolates it, with an error above the tolerance of a repeated state where the motion is steady."""
+    experiment = Experiment.from_dict(
+        {
+            "title": "x",
+            "model": {"kind": "duffing", "delta": 0.2, "beta": -0.1, "gamma": 0.3, "omega": 0.9},
+            "schemes": ["central", "rk4"],
+            "time": {"periods": 60, "steps_per_period": 16, "frequency": "model.omega"},
+            "levels": [2, 3],
+            "checks": [{"value": "section_period", "equals": 1}],
+        }
+    )
+    levels = [simulate(experiment, level) for level in experiment.levels]
+    [verdict] = verdicts(experiment, analyse(experiment, levels))
+    assert verdict.status == "PASS"
+
+
 def test_what_is_an_angle_of_one_member_need_not_be_one_of_another() -> None:
     """Each member is asked by itself, so that no number depends on how members are divided into files."""
     system = {"kind": "system", "acceleration": "-sin(u) - c*u", "parameters": {"c": 0.0}}

@@ -91,7 +91,10 @@ def _predicted(experiment: Experiment, record: Record, member: Member, level: in
 
 
 def poincare(experiment: Experiment, record: Record, shown: list[Member]) -> Picture | None:
-    """Draw position and velocity of each member after every period of the force, in the second half of the run."""
+    """Draw position and velocity of each member after every period of the force, in the second half of the run.
+
+    The end is left out, where a scheme may find the velocity by another formula, with a larger error.
+    """
     model, periods = experiment.model.definition, experiment.time.periods
     first = [member for member in shown if member.scheme == shown[0].scheme][:MOST_PANELS]
     if periods is None or not first:
@@ -104,7 +107,7 @@ def poincare(experiment: Experiment, record: Record, shown: list[Member]) -> Pic
     for ax, member in zip(axes, first, strict=True):
         u, v = (state_at(record, name, member, finest) for name in (model.position, model.velocity))
         n = (u.size - 1) // round(periods)
-        u, v = (values[::n][round(periods) // 2 :] for values in (u, v))
+        u, v = (values[:-1:n][round(periods) // 2 :] for values in (u, v))
         ax.plot(u, v, linestyle="none", marker=".", markersize=3.0, color=style.look(0)["color"])
         ax.set_title(member.case_words or member.scheme_name)
         ax.set_xlabel(style.label(words.symbol(model.position), units[0]))
