@@ -13,7 +13,7 @@ from experiment_files import GOOD, build, content, faults_of, file_faults, only_
 from vibsim.analysis import analyse_records
 from vibsim.core.errors import InputError
 from vibsim.experiment import Experiment, kinds
-from vibsim.experiment.rules import checks as check_rules
+from vibsim.experiment.rules import values as value_rules
 from vibsim.experiment.value_names import VALUES
 from vibsim.models import MODELS, quantities
 from vibsim.schemes import SCHEMES
@@ -518,7 +518,7 @@ def test_nothing_is_compared_with_an_exact_value_that_is_not_known(
     changes = check(value=name, below=1, **of) | {"model": {"kind": kind}}
     build(**changes)
     # a motion without events would be computed where it is not known exactly
-    monkeypatch.setattr(check_rules, "has_solution", lambda model: model.exact is not None)
+    monkeypatch.setattr(value_rules, "has_solution", lambda model: model.exact is not None)
     change_model(monkeypatch, kind, **{lost: None})
     if (VALUES[name].needs_exact == "period") != (lost == "exact_period"):
         build(**changes)
@@ -548,7 +548,7 @@ def test_why_an_exact_value_is_not_known_is_said(model: dict[str, Any], why: str
 
 def test_the_energy_is_known_exactly_where_it_is_conserved(monkeypatch: pytest.MonkeyPatch) -> None:
     changes = value(value="error_l2", quantity="energy")
-    monkeypatch.setattr(check_rules, "has_solution", lambda model: model.exact is not None)
+    monkeypatch.setattr(value_rules, "has_solution", lambda model: model.exact is not None)
     change_model(monkeypatch, exact=None)
     build(**changes)
     change_model(monkeypatch, conservative=False, exact=None)

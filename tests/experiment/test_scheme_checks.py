@@ -11,7 +11,7 @@ from test_experiment_faults import change_model
 
 from vibsim.experiment import Experiment, canonical, restore
 from vibsim.experiment.data import schemes_of
-from vibsim.experiment.rules import checks as check_rules
+from vibsim.experiment.rules import values as value_rules
 from vibsim.experiment.value_names import VALUES
 from vibsim.models import MODELS, centred, quantities
 from vibsim.schemes import FIXED_STEP, SCHEMES
@@ -180,7 +180,7 @@ def test_what_is_exact_must_be_known(monkeypatch: pytest.MonkeyPatch) -> None:
         return [{"equal": ["rk4", "exact"], "quantity": quantity}]
 
     build(checks=check("theta"), schemes=["rk4"])
-    monkeypatch.setattr(check_rules, "has_solution", lambda model: model.exact is not None)
+    monkeypatch.setattr(value_rules, "has_solution", lambda model: model.exact is not None)
     change_model(monkeypatch, exact=None)
     rk4 = {"schemes": ["rk4"]}
     assert "the exact theta" in only_fault(checks=check("theta"), **rk4).rule

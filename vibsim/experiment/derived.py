@@ -8,8 +8,9 @@ from typing import Any, TypeVar
 from vibsim.experiment.data import AnyExperiment, ExperimentSpec, SchemeSpec, Sweep
 from vibsim.experiment.faults import Report
 from vibsim.experiment.rules import size_limits
-from vibsim.experiment.rules.checks import check_published, finish_checks
+from vibsim.experiment.rules.checks import finish_checks
 from vibsim.experiment.rules.members import update_tables
+from vibsim.experiment.rules.published import check_published
 from vibsim.experiment.rules.timing import rising_levels
 from vibsim.experiment.schema.checks import (
     Check,

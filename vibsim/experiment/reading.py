@@ -18,10 +18,11 @@ from vibsim.experiment.kinds import Kinds
 from vibsim.experiment.repeat import write_out_repeats
 from vibsim.experiment.rules import continuation, members, size_limits, timing, unlikely
 from vibsim.experiment.rules import schemes as scheme_rules
-from vibsim.experiment.rules.checks import check_published, finish_checks
+from vibsim.experiment.rules.checks import finish_checks
 from vibsim.experiment.rules.figures import check_figures
 from vibsim.experiment.rules.model import Equation, has_all_values
 from vibsim.experiment.rules.model import equation as read_equation
+from vibsim.experiment.rules.published import check_published
 from vibsim.experiment.rules.scaling import Numbers, characteristic
 from vibsim.experiment.rules.structure import check_histories
 from vibsim.experiment.rules.sweep import read_sweep
