@@ -7,10 +7,8 @@ from __future__ import annotations
 
 import json
 from bisect import bisect_right
-from collections.abc import Collection, Iterator, Mapping, Sequence
-from contextlib import ExitStack, contextmanager
-from dataclasses import dataclass, field
-from itertools import accumulate
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
+from contextlib import ExitStack, closing, contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -140,21 +138,28 @@ def _unpack(value: Any) -> Attribute:
     return plain
 
 
-@dataclass
 class Level:
     """The files of a level, in the order of their members; at most one is open at a time."""
 
-    files: Sequence[tuple[Path, str | None]]
-    borders: Sequence[int]
-    """First member of each file, and finally the total number of members."""
-    _open: ExitStack = field(default_factory=ExitStack)
-    _number: int = -1
-    _dataset: Any = None
+    def __init__(self) -> None:
+        self._files: list[tuple[Path, str | None]] = []
+        self._borders = [0]
+        """First member of each file, and finally the total number of members."""
+        self._open = ExitStack()
+        self._number = -1
+        self._dataset: Any = None
+
+    def add(self, path: Path, *, digest: str | None = None) -> None:
+        """Check a file, whose members follow those of the last one; arguments and exceptions as for `read`."""
+        seal.check(path)
+        self._files.append((path, digest))
+        dataset = self._dataset_of(len(self._files) - 1)
+        self._borders.append(self._borders[-1] + len(dataset.dimensions["case"]))
 
     @property
     def cases(self) -> int:
         """Number of members."""
-        return self.borders[-1]
+        return self._borders[-1]
 
     def read(
         self, start: int = 0, stop: int | None = None, names: Collection[str] | None = None
@@ -164,20 +169,20 @@ class Level:
         first, final = self._file_of(start), self._file_of(max(start, last - 1))
         parts = []
         for number in range(first, final + 1):
-            border = self.borders[number]
-            end = min(last, self.borders[number + 1])
+            border = self._borders[number]
+            end = min(last, self._borders[number + 1])
             cases = slice(max(start, border) - border, end - border)
-            with _naming(self.files[number][0]):
+            with _naming(self._files[number][0]):
                 parts.append(_record(self._dataset_of(number), cases, names))
         return join(parts)
 
     def _file_of(self, member: int) -> int:
-        return min(bisect_right(self.borders, member), len(self.files)) - 1
+        return min(bisect_right(self._borders, member), len(self._files)) - 1
 
     def _dataset_of(self, number: int) -> Any:
         if number != self._number:
             self.close()
-            self._dataset = self._open.enter_context(_opened(*self.files[number]))
+            self._dataset = self._open.enter_context(_opened(*self._files[number]))
             self._number = number
         return self._dataset
 
@@ -188,8 +193,8 @@ class Level:
 
 
 @contextmanager
-def open_level(files: Sequence[tuple[Path, str | None]]) -> Iterator[Level]:
-    """Open the files of a level, whose seals must have been checked (`vibsim.store.check`).
+def open_level(files: Iterable[tuple[Path, str | None]]) -> Iterator[Level]:
+    """Check and open the files of a level.
 
     Parameters
     ----------
@@ -201,15 +206,10 @@ def open_level(files: Sequence[tuple[Path, str | None]]) -> Iterator[Level]:
     DamagedFileError, StaleFileError
         Where a file cannot be read, or another job made it.
     """
-    sizes = []
-    for path, digest in files:
-        with _opened(path, digest) as dataset:
-            sizes.append(len(dataset.dimensions["case"]))
-    level = Level(files, [0, *accumulate(sizes)])
-    try:
+    with closing(Level()) as level:
+        for path, digest in files:
+            level.add(path, digest=digest)
         yield level
-    finally:
-        level.close()
 
 
 def join(records: Sequence[Record]) -> Record:

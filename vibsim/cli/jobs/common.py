@@ -134,14 +134,6 @@ def with_settings(plan: Plan, uses: dict[str, Any]) -> dict[str, Any]:
     return provenance(plan, uses) | ({"settings": list(plan.settings)} if plan.settings else {})
 
 
-def check_levels(plan: Plan, options: Namespace, results: Path) -> None:
-    """Check all level files; raise VibsimError if one is damaged or from another job."""
-    from vibsim import store
-
-    checks = {shard.path: partial(store.check, digest=shard.digest) for shard in plan.shards}
-    read_all(options, results, checks)
-
-
 @contextmanager
 def open_levels(
     plan: Plan, options: Namespace, results: Path
@@ -155,11 +147,12 @@ def open_levels(
     """
     from vibsim import store
 
-    check_levels(plan, options, results)
     with ExitStack() as stack:
-        yield {
-            level.level: stack.enter_context(
-                store.open_level([(results / shard.path, shard.digest) for shard in level.shards])
-            ).read
-            for level in plan.levels
+        levels = {job.level: stack.enter_context(store.open_level([])) for job in plan.levels}
+        checks = {
+            shard.path: partial(levels[job.level].add, digest=shard.digest)
+            for job in plan.levels
+            for shard in job.shards
         }
+        read_all(options, results, checks)
+        yield {number: level.read for number, level in levels.items()}

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from argparse import Namespace
+from functools import partial
 from pathlib import Path
 
 from vibsim import store
-from vibsim.cli.jobs.common import COMPARED, check_levels, on_record, titled, with_settings
+from vibsim.cli.jobs.common import COMPARED, on_record, read_all, titled, with_settings
 from vibsim.core.record import Record
 from vibsim.experiment.solver import restore
 from vibsim.plan import Plan
@@ -17,7 +18,8 @@ from vibsim.solver import analysis
 def judge_levels(plan: Plan, options: Namespace, results: Path) -> int:
     """Compare all levels; write ``convergence.nc`` and ``summary.json``."""
     experiment = restore(plan.content, plan.source_file, plan.settings)
-    check_levels(plan, options, results)
+    shards = {shard.path: partial(store.check, digest=shard.digest) for shard in plan.shards}
+    read_all(options, results, shards)
 
     def read(member: int) -> list[Record]:
         shards = (level.shards[member] for level in plan.levels)
