@@ -17,7 +17,7 @@ from numpy.typing import ArrayLike
 
 from vibsim.core.array_types import Floats, Integers
 from vibsim.schemes.base import Stepper
-from vibsim.theory.doubled import Doubled, doubled, product, stacked
+from vibsim.theory.doubled import Doubled, doubled, product
 from vibsim.theory.roots import Amplification, amplification
 
 _BITS = 5
@@ -136,25 +136,35 @@ def applied(matrix: Doubled, vector: Scaled, times: Integers) -> Scaled:
     shape = (matrix.shape[0], len(times), matrix.shape[-1])
     state = vector.number.mapped(lambda x: np.array(np.broadcast_to(x[:, None], shape)))
     exponent = np.array(np.broadcast_to(vector.exponent[:, None], shape[:2]))
-    factor, remaining = scaled(matrix, 2), times
+    factor, remaining = scaled(matrix[:, None], 2), times
     while remaining.any():
-        table = [factor]
-        for _ in range(2**bits - 2):
-            table.append(_times(table[-1], factor))
+        # powers 1 to 2^bits of the factor
+        powers = factor
+        for _ in range(bits):
+            powers = _joined(powers, _times(powers, _last(powers)))
         digits = remaining & (2**bits - 1)
         rows = np.flatnonzero(digits)
         if len(rows):
             # digit 0 leaves a state unchanged
             chosen = digits[rows] - 1
-            power = stacked([x.number for x in table], matrix.shape, axis=1)[:, chosen]
-            shift = np.stack([x.exponent for x in table], axis=1)[:, chosen]
-            moved = (power @ state[:, rows][..., None])[..., 0]
-            new = scaled(moved, 1, shift + exponent[:, rows])
+            moved = (powers.number[:, chosen] @ state[:, rows][..., None])[..., 0]
+            new = scaled(moved, 1, powers.exponent[:, chosen] + exponent[:, rows])
             state.high[:, rows], state.low[:, rows] = new.number.high, new.number.low
             exponent[:, rows] = new.exponent
         remaining = remaining >> bits
-        factor = _times(table[-1], factor)
+        factor = _last(powers)
     return Scaled(state, exponent)
+
+
+def _last(powers: Scaled) -> Scaled:
+    return Scaled(powers.number[:, -1:], powers.exponent[:, -1:])
+
+
+def _joined(a: Scaled, b: Scaled) -> Scaled:
+    """Return the matrices of `a` and then those of `b`, along the second axis."""
+    high = np.concatenate([a.number.high, b.number.high], axis=1)
+    low = np.concatenate([a.number.low, b.number.low], axis=1)
+    return Scaled(Doubled(high, low), np.concatenate([a.exponent, b.exponent], axis=1))
 
 
 def _times(a: Scaled, b: Scaled) -> Scaled:
