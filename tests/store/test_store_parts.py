@@ -9,12 +9,14 @@ from collections.abc import Iterator
 from dataclasses import replace
 from itertools import pairwise
 from pathlib import Path
+from typing import Any
 
 import netCDF4
 import numpy as np
 import pytest
 
 from vibsim import store
+from vibsim.core import netcdf
 from vibsim.core.errors import DamagedFileError, StaleFileError
 from vibsim.core.record import Record, Variable
 from vibsim.store import writing
@@ -141,6 +143,25 @@ def test_a_level_of_another_job_or_a_damaged_one_is_refused_by_name(
     path.write_bytes(content)
     with pytest.raises(DamagedFileError, match=path.name):
         store.check(path, digest=str(digest))
+    with pytest.raises(DamagedFileError, match=path.name), store.open_level(shards):
+        pass
+
+
+def test_a_level_of_one_file_is_opened_once(
+    shards: list[tuple[Path, str | None]], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    opened: list[Path] = []
+    real = netcdf.opened
+
+    def counted(path: Path) -> Any:
+        opened.append(path)
+        return real(path)
+
+    monkeypatch.setattr(netcdf, "opened", counted)
+    with store.open_level(shards[:1]) as level:
+        level.read(0, 1)
+        level.read()
+    assert opened == [shards[0][0]]
 
 
 MEMORY = """
