@@ -16,7 +16,7 @@ from vibsim import Verdict
 from vibsim.analysis import analyse_records, verdicts
 from vibsim.core.record import Record
 from vibsim.experiment import Experiment
-from vibsim.experiment.cost import PLAIN_MEMBER_STEPS
+from vibsim.experiment.cost import PLAIN_WORK
 from vibsim.simulation import simulate_record
 
 PART = 0.25
@@ -86,9 +86,9 @@ def simulated(experiment: Experiment) -> dict[int, Record]:
     """Return all levels, which share their kernels here: what a level alone must pay back, all of them may."""
     work = experiment.members * sum(map(experiment.steps, experiment.levels))
     with pytest.MonkeyPatch.context() as patch:
-        if work > PLAIN_MEMBER_STEPS:
-            patch.setattr("vibsim.engine.trajectories.PLAIN_MEMBER_STEPS", 0)
-            patch.setattr("vibsim.simulation.adaptive.PLAIN_MEMBER_STEPS", 0)
+        if work > PLAIN_WORK:
+            patch.setattr("vibsim.engine.trajectories.PLAIN_WORK", 0)
+            patch.setattr("vibsim.simulation.adaptive.PLAIN_WORK", 0)
         return {level: simulate_record(experiment, level) for level in experiment.levels}
 
 

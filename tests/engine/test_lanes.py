@@ -328,6 +328,27 @@ def test_the_lane_follows_from_the_size_of_the_work():
     assert lane_for(8, 2**9) == "plain"
     assert lane_for(1, 2**22) == "scalar"
     assert lane_for(2**10, 2**9) == "blocks"
+    assert lane_for(1, 2**13) == "plain"
+    assert lane_for(1, 2**13, step_work=12.0) == "scalar", (
+        "a step that costs twelve is compiled earlier"
+    )
+
+
+def test_a_model_of_several_coordinates_or_with_events_is_compiled_earlier(monkeypatch):
+    """In plain Python their steps take ten times as long as those of the pendulum."""
+    lanes, rk4 = [], SCHEMES["rk4"]
+
+    def lane_seen(*args, **more):
+        lanes.append(lane_for(*args, **more))
+        return lanes[-1]
+
+    monkeypatch.setattr("vibsim.engine.trajectories.lane_for", lane_seen)
+    for kind in ("pendulum", "elastic_pendulum", "sliding_box"):
+        model = MODELS[kind]
+        start = np.full((1, len(model.states)), 0.1)
+        parameters = np.array([[p.default for p in model.parameters]])
+        integrate(model, rk4, rk4.defaults(), parameters, start, np.array([0.001]), 2**14, 2**10)
+    assert lanes == ["plain", "scalar", "scalar"]
 
 
 @pytest.mark.parametrize("model", MODEL_CASES)

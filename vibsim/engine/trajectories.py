@@ -11,7 +11,7 @@ from vibsim.engine import block_loop, events, extrema, gather, results
 from vibsim.engine.kernel import carried, kernel, observer
 from vibsim.engine.results import Trajectories
 from vibsim.engine.stages import kept_names
-from vibsim.experiment.cost import PLAIN_MEMBER_STEPS
+from vibsim.experiment.cost import PLAIN_WORK, work, work_alone
 from vibsim.models import Model, has_budget
 from vibsim.models.base import Formula
 from vibsim.schemes import Scheme
@@ -21,14 +21,14 @@ TASK = 16 * block_loop.LANES
 """Number of members per task of a thread."""
 
 
-def lane_for(members: int, steps: int, *, alone: bool = False) -> str:
+def lane_for(members: int, steps: int, *, alone: bool = False, step_work: float = 1.0) -> str:
     """Choose the lane from the size of the work; the bits are the same in every lane.
 
     `alone` says that members cannot be stepped together by vector instructions: the step is implicit and iterates as
-    often as its member needs, the model has events, which divide the steps of a member, or several coordinates, or a
-    table, which each member looks up at its own place.
+    often as its member needs, or the model does not allow it (`vibsim.experiment.cost.work_alone`). `step_work` is the
+    work of a step, in explicit steps of one coordinate with one force evaluation.
     """
-    if members * steps <= PLAIN_MEMBER_STEPS:
+    if members * steps * step_work <= PLAIN_WORK:
         return "plain"
     return "blocks" if members > 1 and not alone else "scalar"
 
@@ -86,8 +86,11 @@ def integrate(
     _check_shapes(model, parameters, initial, members)
     stepper = scheme.stepper_for(model, options)
     has_events, has_work = model.events is not None, has_budget(model)
-    alone = stepper.implicit or has_events or count > 1 or model.lookup is not None
-    lane = lane or lane_for(members, steps, alone=alone)
+    if lane is None:
+        factor = work_alone(model)
+        step_work = sum(work(scheme.force_evaluations, scheme.explicit, factor))
+        alone = stepper.implicit or factor is not None
+        lane = lane_for(members, steps, alone=alone, step_work=step_work)
     run = kernel(model, stepper, lane, with_gathered, with_series, n_extrema > 0)
 
     # arrays that the kernel fills; NaN until known

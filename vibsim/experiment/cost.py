@@ -13,9 +13,10 @@ from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
     from vibsim.experiment.data import ExperimentSpec
+    from vibsim.models import Model
 
-PLAIN_MEMBER_STEPS = 40_000
-"""Member-steps of one scheme up to which plain Python is faster than loading a compiled kernel."""
+PLAIN_WORK = 40_000
+"""Work of one scheme (`work`, times member-steps) up to which plain Python is faster than loading a compiled kernel."""
 PLAIN_SECONDS = 1.2e-6
 """Time of one member-step in plain Python [s]."""
 ONE_SECONDS = 12e-9
@@ -29,8 +30,8 @@ IMPLICIT_WORK = 3.0
 """Work of an implicit step, in explicit steps with one evaluation, for each force evaluation of an iteration."""
 EVENTFUL = 2.5
 """Work of a step of a model with events, in steps of a smooth motion."""
-COUPLED = 2.0
-"""Work of a step of several coordinates, or with a force from a table, in steps of one coordinate."""
+LOOKED_UP = 2.0
+"""Work of a step with a force from a table, in steps with a force from a formula."""
 STRUCTURE_SECONDS = (35e-6, 12e-9)
 """Time of a step of a linear structure, and additional time per nonzero of the stiffness matrix [s]."""
 SECONDS_PER_BYTE = 4e-9
@@ -108,6 +109,18 @@ COMPARED_SERIES_FILE = 60_000
 """Further bytes of that file if an analysis writes series."""
 
 
+def work_alone(model: Model) -> float | None:
+    """Return the work of a step of `model`, in steps of one coordinate and a smooth motion, or None.
+
+    None says that members can be stepped together by vector instructions. They cannot if the model has events, which
+    divide the steps of a member, or several coordinates, or a table, which each member looks up at its own place.
+    """
+    if model.coordinates == 1 and model.lookup is None and model.events is None:
+        return None
+    table = 1.0 if model.lookup is None else LOOKED_UP
+    return model.coordinates * table * (1.0 if model.events is None else EVENTFUL)
+
+
 def work(force_evaluations: int, explicit: bool, alone: float | None = None) -> tuple[float, float]:
     """Return the vectorised and the member-by-member work of a step, in explicit steps with one force evaluation.
 
@@ -116,7 +129,7 @@ def work(force_evaluations: int, explicit: bool, alone: float | None = None) -> 
     force_evaluations
         Force evaluations per step; per iteration for an implicit scheme.
     alone
-        `EVENTFUL` or `COUPLED` for models whose members are stepped one by one with any scheme.
+        What `work_alone` says of the model.
     """
     explicit_work, iterated = 1.0 + EVALUATION_WORK * (force_evaluations - 1), 0.0
     if not explicit:
@@ -224,7 +237,9 @@ class LevelCost:
         return self.work * explicit + self.iterated * iterated
 
     def _is_plain(self, members: int) -> bool:
-        return members * self.steps <= PLAIN_MEMBER_STEPS * self.chain
+        """Whether the engine steps in plain Python, judged by the mean work of the schemes."""
+        total = members * self.steps * (self.work + self.iterated)
+        return total <= PLAIN_WORK * self.chain * self.schemes
 
 
 def _compressed(size: int, series: tuple[int, int], extrema: tuple[int, int]) -> int:
@@ -307,11 +322,8 @@ def level_cost(experiment: ExperimentSpec, level: int) -> LevelCost:
 
     model, steps = experiment.model.definition, experiment.steps(level)
     lean = is_bounded(experiment)
-    # these models are stepped one member at a time
-    alone = COUPLED if model.coordinates > 1 or model.lookup is not None else None
-    alone = EVENTFUL if model.events is not None else alone
     kinds = [experiment.schemes[i].method for i in experiment.ladder]
-    works = [work(kind.force_evaluations, kind.explicit, alone) for kind in kinds]
+    works = [work(kind.force_evaluations, kind.explicit, work_alone(model)) for kind in kinds]
     # periods of an unswept member
     turns = experiment.time.end * float(model.natural_frequency(experiment.model.parameters))
     shared = sum(

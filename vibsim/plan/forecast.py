@@ -12,7 +12,7 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 from vibsim.core.vocabulary import LEVELS_OF_AN_ORDER
-from vibsim.experiment.cost import PLAIN_MEMBER_STEPS, LevelCost, analysis_disk
+from vibsim.experiment.cost import PLAIN_WORK, LevelCost, analysis_disk
 from vibsim.experiment.storage import is_bounded
 from vibsim.formula.jumps import held
 from vibsim.models import has_solution, tree
@@ -107,7 +107,7 @@ def other_seconds(experiment: Experiment, levels: Sequence[LevelCost]) -> float:
     series = 0.0
     for level in levels:
         samples = experiment.trajectories * level.samples
-        series += samples * level.series * (plain if samples <= PLAIN_MEMBER_STEPS else compiled)
+        series += samples * level.series * (plain if samples <= PLAIN_WORK else compiled)
     start, per_byte, per_quantity = ANALYSIS_SECONDS
     written = analysis_disk(levels, experiment.members, is_bounded(experiment))
     compared = start + per_byte * written + per_quantity * levels[0].series * len(levels)

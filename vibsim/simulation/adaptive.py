@@ -27,11 +27,10 @@ from typing import Any
 import numpy as np
 
 from vibsim.core.array_types import Floats, Integers
-from vibsim.engine import Trajectories
+from vibsim.engine import Trajectories, lane_for
 from vibsim.engine import integrate as integrate_steps
 from vibsim.engine.gather import OVERFLOW
 from vibsim.engine.kernel import kernel
-from vibsim.experiment.cost import PLAIN_MEMBER_STEPS
 from vibsim.models import Model
 from vibsim.schemes.base import Options, Scheme, Stepper
 from vibsim.schemes.code_generation import written
@@ -151,7 +150,7 @@ def gather_over(
         dt,
         steps,
         every,
-        lane="plain" if members * steps <= PLAIN_MEMBER_STEPS else "scalar",
+        lane=lane_for(members, steps, alone=True),
         **more,
     )
 

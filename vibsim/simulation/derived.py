@@ -72,7 +72,8 @@ def derived(
     result = {name: np.empty((schemes, cases, times)) for name in wanted}
     result["energy_initial"] = np.empty((schemes, cases))
     parameters = group.numbers(model)
-    lane, piece = lane_for(cases, schemes * times), max(SAMPLES_AT_A_TIME // times, 1)
+    lane = lane_for(cases, schemes * times, step_work=model.coordinates)
+    piece = max(SAMPLES_AT_A_TIME // times, 1)
     for s in range(schemes):
         for first in range(0, cases, piece):
             part = slice(first, first + piece)
