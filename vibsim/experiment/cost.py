@@ -323,7 +323,9 @@ def level_cost(experiment: ExperimentSpec, level: int) -> LevelCost:
     model, steps = experiment.model.definition, experiment.steps(level)
     lean = is_bounded(experiment)
     kinds = [experiment.schemes[i].method for i in experiment.ladder]
-    works = [work(kind.force_evaluations, kind.explicit, work_alone(model)) for kind in kinds]
+    # the engine does not step a linear structure
+    stepped = kinds if model.loaded is None else []
+    works = [work(kind.force_evaluations, kind.explicit, work_alone(model)) for kind in stepped]
     # periods of an unswept member
     turns = experiment.time.end * float(model.natural_frequency(experiment.model.parameters))
     shared = sum(
