@@ -217,9 +217,24 @@ def test_equal_changes_by_rounding_leave_a_steady_motion_its_bound(
 
     monkeypatch.setattr(steady_state, "harmonic", harmonic)
     noise = np.array([[8.0 * ulp]])
-    found = steady_state.distance(None, 0, "u", noise)  # type: ignore[arg-type]
-    assert found[0, 0] == steady_state.REST_SAFETY * ulp
+    found = steady_state.distance(None, 0, "u", noise, 60.0)  # type: ignore[arg-type]
+    assert found[0, 0] == steady_state.REST_SAFETY * 8.0 * ulp * 60.0
     assert np.isinf(steady_state.distance(None, 0, "u"))  # type: ignore[arg-type]
+
+
+def test_a_slow_transient_that_changes_less_than_rounding_is_within_the_bound(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """A weakly damped motion is a hundred changes away from its steady one."""
+    left, factor, noise = 1e-13, 0.99, 2e-15
+
+    def harmonic(block: Any, level: int, quantity: str, back: int = 0) -> Any:
+        return np.array([[left * factor**-back + 0j]])
+
+    monkeypatch.setattr(steady_state, "harmonic", harmonic)
+    assert left * (1.0 / factor - 1.0) < noise
+    found = steady_state.distance(None, 0, "u", noise, 200.0)  # type: ignore[arg-type]
+    assert left < found[0, 0] < 10.0 * left
 
 
 def test_a_steady_motion_of_a_response_curve_has_a_bound() -> None:

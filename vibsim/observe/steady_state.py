@@ -148,18 +148,25 @@ def rounding(block: MemberBlock, level: int, quantity: str) -> Floats:
     return ROUNDINGS * floor[..., block.grid.levels.index(level)]
 
 
-def distance(block: MemberBlock, level: int, quantity: str, noise: Floats | float = 0.0) -> Floats:
+def distance(
+    block: MemberBlock,
+    level: int,
+    quantity: str,
+    noise: Floats | float = 0.0,
+    periods: float = 0.0,
+) -> Floats:
     """Return a bound of the distance of the harmonic from that of the steady motion, shape (scheme, case).
 
     The transient is multiplied by a complex factor z in each period, so that its last change c leaves ``c z/(z - 1)``.
     The larger of the last two such estimates is multiplied by `REST_SAFETY`. Infinite with fewer than `LEAST_PERIODS`.
-    A change of at most `noise` tells no factor, and leaves its own size.
+    A change of at most `noise` tells no factor. A transient that decays within the run, of so many `periods`, then
+    leaves at most ``noise * periods``: its size over its change is the number of periods in which it decays.
     """
     rows = [harmonic(block, level, quantity, back) for back in range(LEAST_PERIODS)]
     changes = [now - before for now, before in itertools.pairwise(rows)]
     with np.errstate(divide="ignore", invalid="ignore"):
         transients = [
-            np.where(np.abs(last) <= noise, np.abs(last), np.abs(last / (1.0 - before / last)))
+            np.where(np.abs(last) <= noise, noise * periods, np.abs(last / (1.0 - before / last)))
             for last, before in itertools.pairwise(changes)
         ]
     bound = REST_SAFETY * np.maximum(*transients)

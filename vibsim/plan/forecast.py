@@ -107,7 +107,8 @@ def other_seconds(experiment: Experiment, levels: Sequence[LevelCost]) -> float:
     series = 0.0
     for level in levels:
         samples = experiment.trajectories * level.samples
-        series += samples * level.series * (plain if samples <= PLAIN_WORK else compiled)
+        is_plain = samples * level.coordinates <= PLAIN_WORK
+        series += samples * level.series * (plain if is_plain else compiled)
     start, per_byte, per_quantity = ANALYSIS_SECONDS
     written = analysis_disk(levels, experiment.members, is_bounded(experiment))
     compared = start + per_byte * written + per_quantity * levels[0].series * len(levels)
