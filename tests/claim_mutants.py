@@ -88,7 +88,6 @@ def simulated(experiment: Experiment) -> dict[int, Record]:
     with pytest.MonkeyPatch.context() as patch:
         if work > PLAIN_WORK:
             patch.setattr("vibsim.engine.trajectories.PLAIN_WORK", 0)
-            patch.setattr("vibsim.simulation.adaptive.PLAIN_WORK", 0)
         return {level: simulate_record(experiment, level) for level in experiment.levels}
 
 
