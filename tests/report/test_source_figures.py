@@ -335,5 +335,7 @@ def test_a_poincare_section_has_a_point_a_period() -> None:
     ((_, [picture]),), _ = drawn(exp)
     for panel in lines(picture)[:2]:
         ((_, u, v),) = panel
-        assert u.size == v.size == 10, "the beginnings of the last ten periods, without the end of the run"
+        assert u.size == v.size == 10, (
+            "the beginnings of the last ten periods, without the end of the run"
+        )
         assert np.ptp(u[-3:]) < 0.1 * np.max(np.abs(u))
