@@ -126,6 +126,21 @@ def test_missing_cells_of_a_map_are_hatched_and_cells_have_borders():
     assert "Grey" not in full.caption
 
 
+def test_a_page_leads_with_the_member_and_scheme_of_the_decisive_result():
+    check = {"converges": "theta", "order": "scheme", "at": {"model.g": 4.0}}
+    schemes = ["rk4", "central"]
+    exp = samples.experiment(
+        levels=[6, 7, 8, 9], sweep={"model.g": [1.0, 4.0]}, schemes=schemes, checks=[check]
+    )
+    record, summary = samples.record(exp), samples.summary(exp, samples.record(exp))
+    for entry in summary["checks"]:
+        for result in entry["results"]:
+            led = choice.find_lead(exp, record, {"checks": [entry | {"results": [result]}]}).member
+            assert (led.case, led.scheme_name) == (result["case"], result["scheme"])
+    assert {row["scheme"] for row in summary["checks"][0]["results"]} == set(schemes)
+    assert {row["case"] for row in summary["checks"][0]["results"]} == {1}
+
+
 @pytest.mark.usefixtures("without_pictures")
 def test_a_sweep_names_a_member_once_per_block_of_a_page_and_in_every_row_of_a_file(tmp_path):
     exp = samples.experiment(levels=[6, 7, 8, 9], sweep=GRID)

@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import cmath
 import math
+from collections.abc import Callable
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -192,17 +195,26 @@ def test_amplitude_and_phase_of_a_linear_oscillator_converge_to_the_closed_form(
     np.testing.assert_allclose(rates[-1], [2.0, 4.0], atol=0.1)
 
 
+def distance(
+    monkeypatch: pytest.MonkeyPatch, of: Callable[[int], complex], noise: float, periods: float
+) -> float:
+    """Return the bound of `steady_state.distance` for the harmonic `of` so many periods before the end."""
+
+    def harmonic(block: Any, level: int, quantity: str, back: int = 0) -> Any:
+        return np.array([[of(back)]])
+
+    monkeypatch.setattr(steady_state, "harmonic", harmonic)
+    monkeypatch.setattr(steady_state, "rounding", lambda *_: np.array([[noise]]))
+    block: Any = SimpleNamespace(experiment=SimpleNamespace(time=SimpleNamespace(periods=periods)))
+    return float(steady_state.distance(block, 0, "u")[0, 0])
+
+
 def test_what_is_left_of_a_transient_is_what_its_last_changes_say(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     """Of one that a period multiplies by z: the larger of the last two estimates is exact a period ago."""
-    z, steady = 0.6 * np.exp(0.4j), 0.8j
-
-    def harmonic(block: Any, level: int, quantity: str, back: int = 0) -> Any:
-        return np.array([[steady + 0.1 * z ** (5 - back)]])
-
-    monkeypatch.setattr(steady_state, "harmonic", harmonic)
-    found = steady_state.distance(None, 0, "u")  # type: ignore[arg-type]
+    z = 0.6 * cmath.exp(0.4j)
+    found = distance(monkeypatch, lambda back: 0.8j + 0.1 * z ** (5 - back), 0.0, 60.0)
     np.testing.assert_allclose(found, steady_state.REST_SAFETY * 0.1 * 0.6**4, rtol=1e-12)
 
 
@@ -212,14 +224,12 @@ def test_equal_changes_by_rounding_leave_a_steady_motion_its_bound(
     """A factor of 1 between two changes would leave an infinite rest, which rounding must not decide."""
     ulp = 2.0**-53
 
-    def harmonic(block: Any, level: int, quantity: str, back: int = 0) -> Any:
-        return np.array([[0.8 + ulp * back + 0j]])
+    def harmonic(back: int) -> complex:
+        return 0.8 + ulp * back
 
-    monkeypatch.setattr(steady_state, "harmonic", harmonic)
-    noise = np.array([[8.0 * ulp]])
-    found = steady_state.distance(None, 0, "u", noise, 60.0)  # type: ignore[arg-type]
-    assert found[0, 0] == steady_state.REST_SAFETY * 8.0 * ulp * 60.0
-    assert np.isinf(steady_state.distance(None, 0, "u"))  # type: ignore[arg-type]
+    noise = 8.0 * ulp
+    assert distance(monkeypatch, harmonic, noise, 60.0) == steady_state.REST_SAFETY * noise * 60.0
+    assert math.isinf(distance(monkeypatch, harmonic, 0.0, 60.0))
 
 
 def test_a_slow_transient_that_changes_less_than_rounding_is_within_the_bound(
@@ -227,14 +237,9 @@ def test_a_slow_transient_that_changes_less_than_rounding_is_within_the_bound(
 ) -> None:
     """A weakly damped motion is a hundred changes away from its steady one."""
     left, factor, noise = 1e-13, 0.99, 2e-15
-
-    def harmonic(block: Any, level: int, quantity: str, back: int = 0) -> Any:
-        return np.array([[left * factor**-back + 0j]])
-
-    monkeypatch.setattr(steady_state, "harmonic", harmonic)
     assert left * (1.0 / factor - 1.0) < noise
-    found = steady_state.distance(None, 0, "u", noise, 200.0)  # type: ignore[arg-type]
-    assert left < found[0, 0] < 10.0 * left
+    found = distance(monkeypatch, lambda back: left * factor**-back, noise, 200.0)
+    assert left < found < 10.0 * left
 
 
 def test_a_steady_motion_of_a_response_curve_has_a_bound() -> None:

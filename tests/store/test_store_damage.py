@@ -3,11 +3,12 @@ from __future__ import annotations
 import random
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from vibsim import store
 from vibsim.core.errors import DamagedFileError, FileError, StaleFileError
-from vibsim.core.record import Record
+from vibsim.core.record import Record, Variable
 
 from .conftest import DIGEST, build
 
@@ -80,6 +81,21 @@ def test_a_file_changed_by_another_program_is_seen(file: Path) -> None:
         dataset["theta"][0, 0, 0] = 1.5
     with pytest.raises(DamagedFileError):
         store.read(file)
+
+
+def test_a_sealed_file_without_members_is_damaged(tmp_path: Path) -> None:
+    path = tmp_path / "level_08.nc"
+    record = Record(
+        {},
+        {"theta": Variable(("t",), np.zeros(3), {"long_name": "angle", "units": "1"})},
+        {"title": "no members"},
+    )
+    store.write(path, record, digest=DIGEST, provenance={})
+    with (
+        pytest.raises(DamagedFileError, match=r"level_08\.nc"),
+        store.open_level([(path, DIGEST)]),
+    ):
+        pass
 
 
 def test_a_seal_made_for_rubbish_does_not_reach_the_caller_as_a_crash(tmp_path: Path) -> None:

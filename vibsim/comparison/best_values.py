@@ -187,8 +187,7 @@ def _of_run(name: str, place: value_numbers.Place) -> Floats:
     at = place.block, place.levels[-1], place.quantity
     if name == "peak_frequency":
         return spectrum.error_by_other_lines(*at)
-    periods = place.block.experiment.time.periods or 0.0
-    left = steady_state.distance(*at, steady_state.rounding(*at), periods)
+    left = steady_state.distance(*at)
     return left if name == "steady_amplitude" else safe_ratio(left, steady_state.amplitude(*at))
 
 

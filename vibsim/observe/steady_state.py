@@ -148,20 +148,15 @@ def rounding(block: MemberBlock, level: int, quantity: str) -> Floats:
     return ROUNDINGS * floor[..., block.grid.levels.index(level)]
 
 
-def distance(
-    block: MemberBlock,
-    level: int,
-    quantity: str,
-    noise: Floats | float = 0.0,
-    periods: float = 0.0,
-) -> Floats:
+def distance(block: MemberBlock, level: int, quantity: str) -> Floats:
     """Return a bound of the distance of the harmonic from that of the steady motion, shape (scheme, case).
 
     The transient is multiplied by a complex factor z in each period, so that its last change c leaves ``c z/(z - 1)``.
     The larger of the last two such estimates is multiplied by `REST_SAFETY`. Infinite with fewer than `LEAST_PERIODS`.
-    A change of at most `noise` tells no factor. A transient that decays within the run, of so many `periods`, then
-    leaves at most ``noise * periods``: its size over its change is the number of periods in which it decays.
+    A change that `rounding` explains tells no factor. A transient that decays within the periods of the run then leaves
+    at most this rounding times their number: its size over its change is the number of periods in which it decays.
     """
+    noise, periods = rounding(block, level, quantity), block.experiment.time.periods or 0.0
     rows = [harmonic(block, level, quantity, back) for back in range(LEAST_PERIODS)]
     changes = [now - before for now, before in itertools.pairwise(rows)]
     with np.errstate(divide="ignore", invalid="ignore"):

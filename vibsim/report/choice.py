@@ -212,6 +212,4 @@ def find_lead(experiment: Experiment, record: Record, summary: Mapping[str, Any]
     is_compared = any(f"{name}_{kind}_norm" in record for kind in ("difference", "error"))
     quantity = name if is_compared else default
     result = entry["results"][0]
-    case = data.case_position(record, result["case"]) or 0
-    member = data.of_result(record, result) or data.of_case(record, case)[0]
-    return Lead(quantity, member, entry, check)
+    return Lead(quantity, data.of_result(record, result), entry, check)

@@ -238,12 +238,10 @@ def of_case(record: Record, case: int, role: str = "") -> list[Member]:
     return [Member(s, case, scheme, name, role) for s, scheme in enumerate(record.words("scheme"))]
 
 
-def of_result(record: Record, result: Mapping[str, Any]) -> Member | None:
-    """Return the member and scheme of a result in a summary; None if the result is of all members or schemes."""
-    case, schemes = case_position(record, result["case"]), record.words("scheme")
-    if case is None or result["scheme"] not in schemes:
-        return None
-    return of_case(record, case)[schemes.index(result["scheme"])]
+def of_result(record: Record, result: Mapping[str, Any]) -> Member:
+    """Return the member and scheme of a result in a summary."""
+    scheme = record.words("scheme").index(result["scheme"])
+    return of_case(record, record.place("case", result["case"]))[scheme]
 
 
 def case_position(record: Record, case: int) -> int | None:

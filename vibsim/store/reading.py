@@ -154,6 +154,8 @@ class Level:
         seal.check(path)
         self._files.append((path, digest))
         dataset = self._dataset_of(len(self._files) - 1)
+        if "case" not in dataset.dimensions:
+            raise DamagedFileError(path, "it has no members")
         self._borders.append(self._borders[-1] + len(dataset.dimensions["case"]))
 
     @property

@@ -38,9 +38,9 @@ def picture(
     experiment: Experiment, record: Record, asserted: Check | None, check: Mapping[str, Any]
 ) -> Picture | None:
     """Return the picture of the decisive result of a check; None if there is nothing to draw."""
-    member = data.of_result(record, check["results"][0])
-    if asserted is None or member is None:
+    if asserted is None:
         return None
+    member = data.of_result(record, check["results"][0])
     measured, name = asserted.measured, asserted.id
     draw = DRAWN[measured.kind]
     if is_lean(record) and draw in (energy.picture, equal.picture, stable.picture):

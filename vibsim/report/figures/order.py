@@ -193,7 +193,7 @@ def _has_order(ax: Axes, record: Record, quantity: str, case: int) -> bool:
     is_short = len(data.whole(record, "level")) < 3
     ax.set(xticks=[], yticks=[])
     why = " it takes three levels" if is_short else "\nno ratio of differences exists"
-    style.remark(ax, f"no order:{why}")
+    style.remark(ax, f"no order of the {words.USUAL_NORM}:{why}")
     return False
 
 

@@ -390,7 +390,7 @@ def keeps_promise(record: Record, measured: Measurement | None, check: Mapping[s
     order, member = words.fact(decisive, "order"), data.of_result(record, decisive)
     if measured is None or measured.kind != "converges" or measured.order == "scheme":
         return False
-    if order is None or member is None:
+    if order is None:
         return False
     formal = data.formal_order(record, member, measured.converges)
     is_promised = data.basis_of_order(record, measured.converges) == "promised"
