@@ -599,7 +599,7 @@ def test_of_several_schemes_the_one_that_decides_is_named():
         schemes=["central", wrong], checks=[{"converges": "theta", "order": 2}]
     )
     shown = first(exp)
-    title = "The angle θ converges at first order, not at second, in 1 of 2 schemes"
+    title = "The angle θ converges at first order, not at second, with wrong"
     assert shown["finding"] == title
     assert all(number["label"].endswith(", wrong") for number in shown["numbers"])
 

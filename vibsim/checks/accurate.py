@@ -177,17 +177,17 @@ def describe(f: MemberFacts, check: AccurateCheck) -> Description:
     match f.reason:
         case "match":
             return Description(
-                f"{s.subject} is accurate to {s.error()} at level {s.level} (at most {s.most()}), as asked "
+                f"{s.subject} is accurate to {s.error()} at level {s.level}{s.bound('at most', s.most())}, as asked "
                 f"({s.asked}).{s.mean()}",
                 "",
-                f"{s.error()} at level {s.level}, at most {s.most()}",
+                f"{s.error()} at level {s.level}{s.bound('at most', s.most())}",
             )
         case "mismatch":
             return Description(
-                f"{s.subject} is not as accurate as asked ({s.asked}). The error at level {s.level} is {s.error()}, at "
-                f"least {s.least()}.{s.mean()}",
+                f"{s.subject} is not as accurate as asked ({s.asked}). The error at level {s.level} is {s.error()}"
+                f"{s.bound('at least', s.least())}.{s.mean()}",
                 s.finer(),
-                f"{s.error()} at level {s.level}, at least {s.least()}",
+                f"{s.error()} at level {s.level}{s.bound('at least', s.least())}",
             )
         case "unstable":
             return Description(
@@ -260,6 +260,10 @@ class _Phrases:
     def least(self) -> str:
         return self._counted(max(2.0 * self.f.fact("error") - self.f.fact("error_bound"), 0.0))
 
+    def bound(self, word: str, limit: str) -> str:
+        """Write a bound of the error; empty if its digits are those of the error, which is known that well."""
+        return "" if limit == self._counted(self.f.fact("error")) else f" ({word} {limit})"
+
     def open(self) -> str:
         """Say that the required accuracy lies between the bounds of the error."""
         return (
@@ -278,7 +282,7 @@ class _Phrases:
         if needed < 0:
             return f"Take finer `levels:` or a scheme of higher order (`schemes:`), or c{change}."
         add = add_levels(self.level, needed - self.level, self.cost)
-        return f"A{add}, which probably reaches it by the measured order, or c{change}."
+        return f"A{add}. By the measured order, that is probably enough. Or c{change}."
 
     def more_levels(self) -> str:
         """Say how to find the order."""

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field, fields, replace
 from functools import cached_property
 from types import MappingProxyType
-from typing import Any, NamedTuple, overload
+from typing import Any, NamedTuple, Self, overload
 
 import numpy as np
 from numpy.typing import NDArray
@@ -159,6 +159,11 @@ class Result:
     reason: str
     facts: Mapping[str, Any] = field(hash=False)
     """Measured facts by name, as plain data; None for a missing one."""
+
+    @classmethod
+    def of(cls, entry: Mapping[str, Any]) -> Self:
+        """Return a result of a summary."""
+        return cls(*(entry[f.name] for f in fields(cls)))
 
     @property
     def value(self) -> float | None:

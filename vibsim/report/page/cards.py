@@ -85,8 +85,7 @@ def card(experiment: Experiment, record: Record, check: Mapping[str, Any]) -> di
     unit = data.pretty_unit(unit_of(experiment, record, value)) if value else ""
     wording = Wording(experiment, record, asserted, words.PAGE)
     decisive, counts, status = check["results"][0], check["counts"], check["status"]
-    facts = (decisive[key] for key in ("scheme", "case", "status", "reason", "facts"))
-    result = Result(*facts)
+    result = Result.of(decisive)
     decides = worst(word for word, count in counts.items() if count)
     text = words.swept(wording.text(result, counts, check["where"]))
     if _is_said(asserted, check):

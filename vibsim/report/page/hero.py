@@ -32,6 +32,7 @@ MOST_NUMBERS = 3  # large numbers on the first screen
 MOST_SCHEMES = 3  # schemes that are named
 # Least width of a panel of evidence with its title, and its height [inch].
 NARROWEST, EVIDENCE = 1.8, 1.7
+NO_BREAK = "\N{NO-BREAK SPACE}"
 MOST_STATEMENTS = 3  # claims that are shown beside the finding
 MEASURED = {
     "stable": "Growth per period", "conserves": "Largest energy error over E(0)", "equal": "Largest difference",
@@ -99,7 +100,8 @@ def _facts(experiment: Experiment, record: Record) -> Iterator[str]:
         yield f"{words.number(len(record['case']), 'integer')} members"
     steps = [words.number(int(n), "integer") for n in record["steps"]]
     ends = np.unique(data.ends_of(record))
-    over = f" up to t = {data.time_text(record, ends[0])}"
+    end = data.time_text(record, ends[0]).replace(" ", NO_BREAK)
+    over = f" up to t{NO_BREAK}={NO_BREAK}{end}"
     span = steps[0] if len(steps) == 1 else f"{steps[0]} to {steps[-1]}"
     yield f"{span} steps{over if ends.size == 1 else ''}"
     yield experiment.source or ""
@@ -115,7 +117,7 @@ def numbers(experiment: Experiment, record: Record, lead: Lead) -> Iterator[Numb
         yield from _error(experiment, record, lead)
     is_of_one = lead.entry is not None and sum(lead.entry["counts"].values()) < 2
     if data.swept(record) and lead.result.get("command") and not is_of_one:
-        text = re.sub(r"(?<!,) ", "\N{NO-BREAK SPACE}", lead.member.case_words)
+        text = re.sub(r"(?<!,) ", NO_BREAK, lead.member.case_words)
         command = called(lead.result["command"])
         yield {"label": "Hardest member", "value": text, "note": f"To run it alone: `{command}`"}
     yield from _best(experiment, record, lead)
@@ -153,6 +155,7 @@ def _measured(experiment: Experiment, record: Record, lead: Lead) -> Iterator[Nu
     if (allowed := lead.facts.get("allowed")) is not None:
         note = f"{words.number(allowed, 'brief')} is allowed"
     value = f"{words.number(number, form)} {unit}".rstrip()
+    label += data.of_several(record, lead.member.scheme)
     yield {"label": label, "value": value, "note": note}
 
 

@@ -46,9 +46,18 @@ def results(record: Record, check: Mapping[str, Any], unit: str) -> Table:
             (Column("interval"), lambda result: words.interval(words.interval_of(result))),
             (Column("levels"), lambda result: words.levels(words.levels_of(result))),
         ]
-    if any(words.number_of(result) is not None for result in listed):
-        # differences and errors need few digits, a number of a value check may need many
-        form = "small" if kind in ("equal", "accurate") else "value"
+    if kind == "accurate":
+        measure = data.norm_unit(record, check["quantity"], "l2")
+        columns += [
+            (Column("L2 error", measure, "small"), lambda result: words.fact(result, "error")),
+            (
+                Column("relative error", form="small"),
+                lambda result: words.fact(result, "relative_error"),
+            ),
+        ]
+    elif any(words.number_of(result) is not None for result in listed):
+        # a difference needs few digits, a number of a value check may need many
+        form = "small" if kind == "equal" else "value"
         columns += [(Column("value", unit, form), _value)]
     return filled(f"results_{check['id']}", "Measured", columns, listed)
 

@@ -9,9 +9,11 @@ from typing import Any
 
 import numpy as np
 
+from vibsim.checks.kinds import KINDS
 from vibsim.checks.order_context import COINCIDE
 from vibsim.checks.order_sentences import UNSEEN
-from vibsim.checks.outcome import about_members
+from vibsim.checks.outcome import Result, about_members
+from vibsim.checks.verdict_text import Wording
 from vibsim.convergence import LadderVerdict
 from vibsim.core.record import Record
 from vibsim.core.vocabulary import plain_name
@@ -107,7 +109,7 @@ def title(experiment: Experiment, record: Record, lead: Lead, printed: Collectio
     entry, finding = lead.entry, _claim_title(lead) or _check_title(experiment, record, lead)
     if entry["status"] != "PASS":
         against = ", against what the check expects" if _is_trap_of_a_number(lead) else ""
-        return f"{finding}{against}{_share_of_runs(record, entry)}"
+        return f"{finding}{against}{_share_of_runs(record, lead)}"
     if entry["id"] in printed:
         count = len(printed)
         return (
@@ -124,11 +126,15 @@ def title(experiment: Experiment, record: Record, lead: Lead, printed: Collectio
     return f"{finding}{_caught(experiment, lead)}"
 
 
-def _share_of_runs(record: Record, entry: Mapping[str, Any]) -> str:
-    """Say how many members or schemes have the verdict; empty if all have."""
-    count, total = entry["counts"][entry["status"]], sum(entry["counts"].values())
+def _share_of_runs(record: Record, lead: Lead) -> str:
+    """Say how many members or schemes have the verdict, by name if it is one scheme; empty if all have."""
+    assert lead.entry is not None
+    counts = lead.entry["counts"]
+    count, total = counts[lead.entry["status"]], sum(counts.values())
     if not 0 < count < total:
         return ""
+    if count == 1 and not data.swept(record):
+        return f", with {lead.result['scheme']}"
     noun = "members" if len(record["scheme"]) == 1 else "runs"
     noun = noun if data.swept(record) else "schemes"
     part, whole = (words.number(n, "integer") for n in (count, total))
@@ -357,6 +363,10 @@ def paragraph(experiment: Experiment, record: Record, lead: Lead, levels: int) -
         # the number stands above, with what is asked for
         return ""
     word = lead.result.get("reason") if lead.is_on_order else lead.entry["reason"]
+    if word == "mismatch" and kind in KINDS:
+        # what was found says more than that it is not as expected
+        wording = Wording(experiment, record, lead.asserted, words.PAGE)
+        return words.swept(wording.sentence(Result.of(lead.result)))
     is_promised = keeps_promise(record, lead.measured, lead.entry)
     meaning = reasons.reason(word, kind, levels=levels, is_promised=is_promised).meaning
     return meaning + (_growing_error(record, lead) if word == "round_off" else "")
