@@ -155,7 +155,8 @@ def _measured(experiment: Experiment, record: Record, lead: Lead) -> Iterator[Nu
     if (allowed := lead.facts.get("allowed")) is not None:
         note = f"{words.number(allowed, 'brief')} is allowed"
     value = f"{words.number(number, form)} {unit}".rstrip()
-    label += data.of_several(record, lead.member.scheme)
+    if check is None or check.kind != "value" or check.at.scheme is None:
+        label += data.of_several(record, lead.member.scheme)
     yield {"label": label, "value": value, "note": note}
 
 
