@@ -361,10 +361,10 @@ def test_bounds_hold_where_rounding_in_single_precision_adds_up() -> None:
 
 @pytest.mark.parametrize("points", [1, 101])
 def test_stated_noise_is_that_of_all_levels(points: int) -> None:
-    """Many steps of first order, each smaller than the noise of two levels, are no noise."""
+    """Many steps of first order, each half the noise of two levels, are no noise."""
     rng = np.random.default_rng(20)
     h = np.linspace(0.1, 0.07, 7)
-    drifting = [np.full(points, 1.0 + x) for x in h]
+    drifting = [np.full(points, 1.0 + 0.5 * x) for x in h]
     assert judge(h, drifting, order=2, noise=0.0025).reason != "exact"
     noisy = [1.0 + rng.normal(scale=0.0025, size=points) for _ in h]
     assert judge(h, noisy, order=2, noise=0.0025).reason == "exact"
