@@ -36,7 +36,6 @@ from vibsim.convergence.thresholds import ABOVE_ROUND_OFF
 from vibsim.core.array_types import Codes, Flags, Floats
 from vibsim.core.vocabulary import CENTRED, DRIFTS
 from vibsim.elementary import on_arrays
-from vibsim.experiment.sweep_columns import by_options
 from vibsim.formula import derivative, values
 from vibsim.models.base import tree
 from vibsim.observe import thresholds as th
@@ -83,7 +82,7 @@ def drift_at(block: MemberBlock, level: int, name: str = "energy_deviation") -> 
     ratio = safe_ratio(*np.broadcast_arrays(energy, initial[..., None]))
     if name.endswith(CENTRED):
         ratio[..., 0] = 1.0
-    one_sided = ~_has_own_end(block)
+    one_sided = ~block.has_own_end()
     running = _held(running, one_sided)
     if f"{name}_max_abs_interior" in record:
         over_steps = np.asarray(record[f"{name}_max_abs_interior"], dtype=float)
@@ -101,14 +100,6 @@ def drift_at(block: MemberBlock, level: int, name: str = "energy_deviation") -> 
     floor[block.adaptive] = SPACING_AT_ONE * size[block.adaptive]
     w = np.asarray(record["natural_frequency"], dtype=float)
     return drift_of(running, ratio, initial, floor, w * block.group.end / (2.0 * np.pi), deviation)
-
-
-def _has_own_end(block: MemberBlock) -> Flags:
-    """Tell whether the velocity at the last point is computed like all others, shape (scheme, case)."""
-    own = by_options(
-        block.experiment, block.columns, lambda scheme, o: scheme.has_own_end(block.model, o)
-    )
-    return np.broadcast_to(own != 0.0, block.shape)
 
 
 def _held(series: Floats, members: Flags) -> Floats:
