@@ -90,7 +90,7 @@ def test_the_means_of_a_linear_drift_climb_by_two():
     level = simulate_record(experiment, 1)
     largest = level["energy_deviation_running_max"][0, 0] / level["energy_initial"][0, 0]
     n = largest.size - 1
-    assert f"m₁ = {short(np.mean(largest[n // 2 : n]))}." in found.caption
+    assert f"m₁ = {short(np.mean(largest[n // 2 :]))}." in found.caption
     assert "a drift like t gives 2" in found.caption
     assert "in proportion to t through" in found.caption
 

@@ -209,6 +209,47 @@ def distance(
     return float(steady_state.distance(block, 0, "u")[0, 0])
 
 
+@pytest.mark.parametrize("beyond", [1e-6, -1e-6])
+def test_a_best_phase_next_to_pi_is_that_of_the_circle_by_any_velocity(beyond: float) -> None:
+    """The levels of `central` are on the other side of pi than the limit, and extrapolate their last velocity."""
+    b, w, k = 0.4, 1.3, 1.0
+    size = w / np.hypot(k - w * w, b * w)
+    lag = float(np.arctan2(b * w, k - w * w)) - np.pi / 2
+    exact = np.pi - beyond if beyond > 0.0 else -np.pi - beyond
+    best = {"quantity": "v", "at": {"level": "best"}}
+    checks = [
+        {"value": "steady_phase", "equals": exact, "atol": 1e-6, **best},
+        {"value": "steady_phase", "above": 3.0, **best},
+        {"value": "steady_amplitude", "equals": size, "atol": 1e-6, **best},
+        {"value": "steady_change", "quantity": "v", "below": 1e-11},
+    ]
+    data: dict[str, Any] = {
+        "title": "t",
+        "model": {
+            "kind": "oscillator",
+            "damping": {"linear": b},
+            "spring": "k*u",
+            "force": "cos(omega*t + s)",
+            "parameters": {"k": k, "omega": w, "s": lag - exact},
+        },
+        "time": {"periods": 30, "steps_per_period": 16, "frequency": "model.parameters.omega"},
+        "levels": [0, 1, 2, 3],
+        "schemes": ["central"],
+        "checks": checks,
+    }
+    experiment = Experiment.from_dict(data)
+    levels = {level: simulate(experiment, level) for level in experiment.levels}
+    phase, above, amplitude, change = verdicts(experiment, analyse(experiment, levels))
+    ((found,), (largest,)) = (phase.results, amplitude.results)
+    assert -np.pi < found.value <= np.pi
+    assert abs(found.value - exact) < 1e-6
+    assert phase.status == "PASS"
+    # an angle of at most pi cannot be told from one of at least -pi
+    assert above.status == "INCONCLUSIVE"
+    assert abs(largest.value - size) < 1e-6
+    assert change.status == "PASS", change.text
+
+
 def test_what_is_left_of_a_transient_is_what_its_last_changes_say(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:

@@ -28,6 +28,7 @@ from vibsim.experiment import Experiment
 from vibsim.experiment.schema.checks import ValueCheck
 from vibsim.experiment.value_names import VALUES
 from vibsim.observe.member_block import MemberBlock
+from vibsim.observe.steady_state import continued, wrapped
 
 FIELDS = {
     "value": Field("the number", unit_of="number"),
@@ -52,15 +53,19 @@ UNKNOWN, SETTLED, MOVING = -1, 0, 1
 
 
 def compare(check: ValueCheck, number: Floats) -> tuple[Flags, Floats]:
-    """Return which numbers, of any shape, meet the check, and by how much they miss it (negative if they meet it)."""
+    """Return which numbers, of any shape, meet the check, and by how much they miss it (negative if they meet it).
+
+    Angles are those in (-pi, pi], and their distance is that on the circle.
+    """
+    if check.number.is_angle:
+        number = wrapped(number)
     if check.below is not None:
         return number < check.below, number - check.below
     if check.above is not None:
         return number > check.above, check.above - number
     wanted = math.nan if check.equals is None else check.equals
-    away = np.abs(number - wanted)
-    if check.number.is_angle:
-        away = np.abs(away - 2.0 * np.pi * np.round(away / (2.0 * np.pi)))
+    away = number - wanted
+    away = np.abs(wrapped(away) if check.number.is_angle else away)
     return away <= check.allowed, away - check.allowed
 
 
@@ -79,7 +84,8 @@ def measure(block: MemberBlock, compared: Compared, check: ValueCheck) -> Measur
         numbers = _by_level(name, place)
     if check.take is not None and row.has_limit(at.level):
         # a reduced number needs a bound for each member
-        bound = np.where(np.isnan(bound), STILL_TO_CHANGE * last_change(numbers) + missed, bound)
+        change = last_change(on_one_branch(check, numbers))
+        bound = np.where(np.isnan(bound), STILL_TO_CHANGE * change + missed, bound)
     own_levels = row.own_levels(levels) or tuple(levels)
     level = place.level if place.level in own_levels else own_levels[-1]
     unseen = np.where(is_open, missed, 0.0)
@@ -111,6 +117,11 @@ def _by_level(name: str, place: value_numbers.Place) -> Floats:
     return np.stack([value_numbers.value(name, row) for row in rows], axis=-1)
 
 
+def on_one_branch(check: ValueCheck, numbers: Floats) -> Floats:
+    """Return a number by level; angles go on through pi as the finest level does."""
+    return continued(numbers, numbers[..., -1:]) if check.number.is_angle else numbers
+
+
 def _prospects(
     check: ValueCheck,
     numbers: Floats,
@@ -132,8 +143,9 @@ def _prospects(
     code = np.full(fulfilled.shape, UNKNOWN)
     if len(levels) > 1:
         with np.errstate(all="ignore"):
-            last = last_change(numbers)
-            change = np.abs(np.diff(numbers[..., -3:], axis=-1))
+            branch = on_one_branch(check, numbers)
+            last = last_change(branch)
+            change = np.abs(np.diff(branch[..., -3:], axis=-1))
             shrinks = change[..., -1] <= STILL_TO_CHANGE / (1.0 + STILL_TO_CHANGE) * change[..., 0]
             reach = np.where(is_open & ~shrinks, MOST_FINER, STILL_TO_CHANGE) * last + unseen
             code[distance[..., -1] <= reach] = MOVING

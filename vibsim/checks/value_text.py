@@ -29,10 +29,12 @@ from vibsim.checks.value import (
     distance_to_the_cut,
     is_proved,
     lacks_levels,
+    on_one_branch,
     room,
 )
 from vibsim.convergence.differences import last_change
 from vibsim.convergence.thresholds import STILL_TO_CHANGE
+from vibsim.core.array_types import Floats
 from vibsim.core.vocabulary import LEVELS_OF_AN_ORDER, is_error_part
 from vibsim.elementary import on_arrays
 from vibsim.experiment.schema.checks import ValueCheck
@@ -188,16 +190,16 @@ def _why_unknown(f: MemberFacts, check: ValueCheck) -> str:
         return ", because the lines around the highest one are not those of a cosine"
     if _is_of_events_at_end(f, check):
         return ", because no level tells whether an event happens before the end of the run"
-    numbers = _by_level_of(f)
+    numbers = _by_level_of(f, check)
     if len(numbers) >= LEVELS_OF_AN_ORDER and np.all(np.isfinite(numbers)):
         return ", because its changes do not shrink steadily from level to level"
     return ", because there is one level only" if len(f.experiment.levels) == 1 else ""
 
 
-def _by_level_of(f: MemberFacts) -> list[float]:
-    """Return a number at each level; empty if it was not stored."""
+def _by_level_of(f: MemberFacts, check: ValueCheck) -> Floats:
+    """Return a number at each level, angles on one branch; empty if it was not stored."""
     is_stored = name_of(f.id, "value_by_level") in f.record
-    return f.fact("value_by_level") if is_stored else []
+    return on_one_branch(check, np.array(f.fact("value_by_level") if is_stored else []))
 
 
 def _is_on_the_mesh(f: MemberFacts, check: ValueCheck) -> bool:
@@ -223,7 +225,7 @@ def advice_on_bound(f: MemberFacts, check: ValueCheck) -> str:
         return f"Give {LEAST_PERIODS} or more `periods:`."
     if _is_of_events_at_end(f, check):
         return "Let the run end a little earlier or later (`time: end`)."
-    numbers = np.array(_by_level_of(f))
+    numbers = _by_level_of(f, check)
     bound = f.fact("error_bound")
     # without a bound, use the distance from the target
     away = bound if np.isfinite(bound) else room(check, f.fact("value"))
@@ -252,7 +254,7 @@ def finer_levels(f: MemberFacts, count: int = FINER) -> str:
 
 def _levels_to_add(f: MemberFacts, check: ValueCheck) -> int:
     """Return how many finer levels a number needs to meet the check if its changes continue to fall as the last two."""
-    numbers = _by_level_of(f)
+    numbers = _by_level_of(f, check)
     if len(numbers) < LEVELS_OF_AN_ORDER:
         return FINER
     previous, last = np.diff(numbers[-3:])

@@ -64,9 +64,10 @@ def value(name: str, place: value_numbers.Place) -> tuple[Floats, Floats, Floats
         return value_numbers.value(name, place), bound, np.zeros(place.block.shape)
     ladder = _ladder(name, place)
     best = ladder.limit()
+    found = steady_state.wrapped(best.value) if VALUES[name].is_angle else best.value
     # an absolute value has no negative limit
     least = 0.0 if name in ("max_abs", "relative_energy_error") else -np.inf
-    return np.maximum(best.value, least), best.bound, ladder.missed
+    return np.maximum(found, least), best.bound, ladder.missed
 
 
 @dataclass(frozen=True)
@@ -126,8 +127,7 @@ def _ladder(name: str, place: value_numbers.Place) -> _Ladder:
     if not row.survives_failure:
         values[block.failed] = np.nan
     if row.is_angle:
-        turns = (values - values[..., -1:]) / (2.0 * np.pi)
-        values -= 2.0 * np.pi * np.round(turns)
+        values = steady_state.continued(values, values[..., -1:])
     size = _size(name, place, values)
     if comparison is not None and row.is_sample:
         floor = comparison.floor

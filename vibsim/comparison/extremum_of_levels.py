@@ -1,4 +1,4 @@
-"""An extremum of a motion at each level, interpolated between grid points if the motion is smooth, and its error."""
+"""An extremum of a motion at each level, at an event or interpolated between grid points, and its error."""
 
 from __future__ import annotations
 
@@ -7,6 +7,8 @@ import numpy as np
 from vibsim.comparison import value_numbers
 from vibsim.comparison.largest_between_samples import (
     WIDTH,
+    Heights,
+    crest_heights,
     largest_between_samples,
     rise_of_other_crests,
 )
@@ -14,6 +16,8 @@ from vibsim.comparison.rescaled_differences import error_factor
 from vibsim.comparison.thresholds import ERROR_OF_LINE
 from vibsim.convergence.extrapolation.thresholds import ORDER_ABOVE_ROUND_OFF
 from vibsim.core.array_types import Flags, Floats
+from vibsim.core.record import Record
+from vibsim.core.vocabulary import LEVELS_OF_AN_ORDER
 from vibsim.observe.member_block import MemberBlock
 
 _UPWARD = {"min": np.negative, "max": np.positive, "max_abs": np.abs}
@@ -30,10 +34,11 @@ def extremum_of_levels(
     size: Floats,
     order: Floats,
 ) -> tuple[Floats, Floats, Flags]:
-    """Return an extremum at each level, a bound of its error at the finest one, and where the motion is smooth.
+    """Return an extremum at each level, a bound of its error at the finest one, and where it has the motion's order.
 
-    Elsewhere it is the extremum over grid points: without a series, near a velocity that events change, and where all
-    levels have the same value and the interpolated series does not exceed it.
+    It has that order at an event that all levels locate, and where the motion is smooth. Elsewhere it is the extremum
+    over grid points: without a series, near a velocity that events change, and where all levels have the same value and
+    the interpolated series does not exceed it.
 
     Parameters
     ----------
@@ -58,8 +63,10 @@ def extremum_of_levels(
     is_smooth = np.where(_is_struck(place.block), error_smooth < error, is_smooth)
     is_smooth = is_smooth & np.isfinite(error_smooth) & ~place.block.adaptive[:, None]
     values = np.where(is_smooth[..., None], smooth, over_points)
-    other_rise = _rise_of_other_crests(series, place.levels, order)
-    return values, np.where(is_smooth, error_smooth, error) + other_rise, is_smooth
+    error = np.where(is_smooth, error_smooth, error) + _rise_between_points(series, place, order)
+    at_events, rise, is_event = _at_events(name, place, over_points, order)
+    values = np.where(is_event[..., None], at_events, values)
+    return values, np.where(is_event, rise, error), is_smooth | is_event
 
 
 def _upward(name: str, place: value_numbers.Place) -> Series:
@@ -131,12 +138,68 @@ def _between_points(name: str, series: Series, over_points: Floats) -> tuple[Flo
     return values, np.where(np.isnan(last[..., -1]), np.nan, np.fmax.reduce(last, axis=-1))
 
 
-def _rise_of_other_crests(series: Series, levels: tuple[int, ...], order: Floats) -> Floats:
+def _rise_between_points(series: Series, place: value_numbers.Place, order: Floats) -> Floats:
     """Return by how much another extremum may exceed that of the finest level in the limit, (scheme, case)."""
-    finest = len(levels) - 1
+    finest = len(place.levels) - 1
     if not {finest - 1, finest} <= set(series):
         return np.zeros(order.shape)
-    coarse, fine = (np.nan_to_num(series[i], posinf=0.0, neginf=0.0) for i in (finest - 1, finest))
-    gap = levels[finest] - levels[finest - 1]
+    known = (np.nan_to_num(series[i], posinf=0.0, neginf=0.0) for i in (finest - 1, finest))
+    coarse, fine = (crest_heights(values) for values in known)
+    return _rise(coarse, fine, place, order)
+
+
+def _rise(coarse: Heights, fine: Heights, place: value_numbers.Place, order: Floats) -> Floats:
+    """Return the rise of other extrema from the heights of all at the two finest levels."""
+    gap = place.levels[-1] - place.levels[-2]
     fall = np.where(np.isfinite(order), -1.0 - error_factor(np.maximum(order, 1.0), gap), 0.0)
     return rise_of_other_crests(coarse, fine, fall.reshape(-1)).reshape(order.shape)
+
+
+def _at_events(
+    name: str, place: value_numbers.Place, over_points: Floats, order: Floats
+) -> tuple[Floats, Floats, Flags]:
+    """Return the extremum at located events at each level, the rise of others, and where it is that of the motion.
+
+    A body turns at an event, or rests behind it to the end.
+    """
+    block, records = place.block, [place.block.records[level] for level in place.levels]
+    nowhere = over_points, np.zeros(order.shape), np.zeros(order.shape, dtype=bool)
+    if place.quantity != block.model.position or len(records) < LEVELS_OF_AN_ORDER:
+        return nowhere
+    if not all({"event_time", "peak", place.quantity} <= set(row.variables) for row in records):
+        return nowhere
+    is_event = np.isnan(block.left_to_the_mesh) & ~block.adaptive[:, None]
+    values, heights, upward = over_points.copy(), [], _UPWARD[name]
+    for i, row in enumerate(records):
+        times, turns = _turns(name, row)
+        rest_time = np.asarray(row["rest_time"])[..., None]
+        rest = np.where(np.isnan(rest_time), -np.inf, upward(row[place.quantity][..., -1:]))
+        highest = np.argmax(turns, axis=-1)[..., None]
+        at = np.take_along_axis(times, highest, -1)
+        is_located = np.any(at == row["event_time"], axis=-1)
+        top = np.take_along_axis(turns, highest, -1)[..., 0]
+        top = np.maximum(np.where(is_located, top, -np.inf), rest[..., 0])
+        with np.errstate(invalid="ignore"):
+            is_event &= top >= np.maximum(upward(over_points[..., i]), turns.max(axis=-1))
+        values[..., i] = upward(top) if name == "min" else top
+        times, turns = np.append(times, rest_time, axis=-1), np.append(turns, rest, axis=-1)
+        heights.append(_sorted(times / block.group.end[:, None], turns))
+    return values, _rise(heights[-2], heights[-1], place, order), is_event
+
+
+def _turns(name: str, record: Record) -> tuple[Floats, Floats]:
+    """Return times and upward heights of the stored turns, -inf behind the last, shape (scheme, case, turn)."""
+    kinds = {"max": ("peak",), "min": ("trough",), "max_abs": ("peak", "trough")}[name]
+    times, heights = (
+        np.concatenate([record[f"{kind}{what}"] for kind in kinds], axis=-1)
+        for what in ("_time", "")
+    )
+    return times, np.where(np.isnan(heights), -np.inf, _UPWARD[name](heights))
+
+
+def _sorted(places: Floats, heights: Floats) -> Heights:
+    """Return the finite heights of all members in the order of their places, which are parts of the run."""
+    row = np.arange(heights[..., 0].size).reshape(heights[..., :1].shape)
+    keys = (2.0 * row + places)[np.isfinite(heights)]
+    order = np.argsort(keys, kind="stable")
+    return Heights(keys[order], heights[np.isfinite(heights)][order])

@@ -64,7 +64,14 @@ def _crests(series: Floats, top: Floats) -> _Crests:
     return _Crests(row[may], centre[may], (index - centre)[may], limit[may], samples[may])
 
 
-def rise_of_other_crests(coarse: Floats, fine: Floats, fall: Floats) -> Floats:
+class Heights(NamedTuple):
+    """Crests of several functions in the order of rows and places."""
+
+    keys: Floats  # twice the row, plus the place as a part of the interval
+    values: Floats
+
+
+def rise_of_other_crests(coarse: Heights, fine: Heights, fall: Floats) -> Floats:
     """Return by how much another crest may exceed, in the limit, the crest that is the highest on the fine grid.
 
     The values of all crests are extrapolated from the coarse and the fine grid. Crests that change alike are harmless.
@@ -72,7 +79,7 @@ def rise_of_other_crests(coarse: Floats, fine: Floats, fall: Floats) -> Floats:
     Parameters
     ----------
     coarse, fine
-        Samples of functions over the same interval, shape (m, t).
+        Crests of m functions on either grid.
     fall
         Remaining change to the limit, over the change from the coarse to the fine grid, shape (m,).
 
@@ -81,28 +88,30 @@ def rise_of_other_crests(coarse: Floats, fine: Floats, fall: Floats) -> Floats:
     array
         Shape (m,); 0 if no other crest can be the highest.
     """
-    (coarse_keys, before), (fine_keys, now) = (_crest_values(series) for series in (coarse, fine))
+    (coarse_keys, before), (fine_keys, now) = coarse, fine
+    if not (len(coarse_keys) and len(fine_keys)):
+        return np.zeros(len(fall))
     partner, partner_of_partner = _nearest(coarse_keys, fine_keys), _nearest(fine_keys, coarse_keys)
     is_mutual = partner_of_partner[partner] == np.arange(len(partner))
     row = fine_keys.astype(np.int64) // 2
     rest = np.where(is_mutual, fall[row] * (now - before[partner]), 0.0)
-    highest = np.full(len(fine), -np.inf)
+    highest = np.full(len(fall), -np.inf)
     np.maximum.at(highest, row, now)
-    limit_of_highest = np.full(len(fine), -np.inf)
+    limit_of_highest = np.full(len(fall), -np.inf)
     is_highest = now == highest[row]
     np.maximum.at(limit_of_highest, row[is_highest], (now + rest)[is_highest])
     above = now + rest - limit_of_highest[row]
-    rise = np.zeros(len(fine))
+    rise = np.zeros(len(fall))
     np.maximum.at(rise, row, np.where(above > ALIKE * np.abs(rest), above + np.abs(rest), 0.0))
     return rise
 
 
-def _crest_values(series: Floats) -> tuple[Floats, Floats]:
-    """Return keys and values of all crests; a key is twice the row plus the position as a part of the interval."""
+def crest_heights(series: Floats) -> Heights:
+    """Return all crests of functions over the same interval from their samples, shape (m, t)."""
     crests = _crests(series, np.full(len(series), -np.inf))
     place, value, _ = _highest(crests.samples, crests.place)
     position = np.clip((crests.centre + place) / (series.shape[-1] - 1), 0.0, 1.0)
-    return 2.0 * crests.row + position, np.minimum(value, crests.limit)
+    return Heights(2.0 * crests.row + position, np.minimum(value, crests.limit))
 
 
 def _nearest(ascending: Floats, targets: Floats) -> Integers:

@@ -20,7 +20,8 @@ smooth the steps in which a drift rises under an oscillation, and a is the oscil
   shows in the range, or in a small rise of M, must move both ends of the range in the same direction;
 - otherwise ``unclear``.
 
-A drift of less than `STILL` over the run is called bounded; a longer run would show it.
+A drift of less than `STILL` over the run is called bounded; a longer run would show it. Where the velocity at the last
+point has a formula of its own (`Scheme.has_own_end`), or does not exist, the sample before stands in its place.
 """
 
 from __future__ import annotations
@@ -71,16 +72,23 @@ def drift_at(block: MemberBlock, level: int, name: str = "energy_deviation") -> 
     if f"{name}_running_max" in record:
         running = np.asarray(record[f"{name}_running_max"], dtype=float)
     else:
-        running = np.abs(deviation)
+        inner = np.array(deviation)
         if name.endswith(CENTRED):
-            running[..., [0, -1]] = 0.0
-        running = np.asarray(np.maximum.accumulate(running, axis=-1))
+            inner[..., [0, -1]] = 0.0
+        running = np.asarray(np.maximum.accumulate(np.abs(inner), axis=-1))
     # from the energy itself if stored, which has more digits if it decays
     plain = name.replace("_deviation", "")
     energy = record[plain] if plain in record else initial[..., None] + deviation
     ratio = safe_ratio(*np.broadcast_arrays(energy, initial[..., None]))
     if name.endswith(CENTRED):
         ratio[..., 0] = 1.0
+    one_sided = ~block.has_own_end()
+    running = _held(running, one_sided)
+    if f"{name}_max_abs_interior" in record:
+        over_steps = np.asarray(record[f"{name}_max_abs_interior"], dtype=float)
+        running[one_sided, -1] = over_steps[one_sided]
+    has_no_end = one_sided | name.endswith(CENTRED)
+    ratio, deviation = _held(ratio, has_no_end), _held(deviation, has_no_end)
     size = np.abs(initial) + solution_size([np.nan_to_num(deviation)])
     # for members that grow without bound the floor overflows
     with np.errstate(over="ignore", invalid="ignore"):
@@ -92,6 +100,13 @@ def drift_at(block: MemberBlock, level: int, name: str = "energy_deviation") -> 
     floor[block.adaptive] = SPACING_AT_ONE * size[block.adaptive]
     w = np.asarray(record["natural_frequency"], dtype=float)
     return drift_of(running, ratio, initial, floor, w * block.group.end / (2.0 * np.pi), deviation)
+
+
+def _held(series: Floats, members: Flags) -> Floats:
+    """Return a series (scheme, case, t) in which the last sample of some members repeats the one before."""
+    result = np.array(series)
+    result[members, -1] = result[members, -2]
+    return result
 
 
 def _condition(block: MemberBlock, level: int, size: Floats) -> Floats:
@@ -154,14 +169,13 @@ def drift_of(
         The deviation with its sign, in the shape of M; None: only M is used.
     """
     samples = running.shape[-1] - 1
-    # without the last point, whose velocity may be one-sided
-    end = np.fmax.reduce(running[..., :-1], axis=-1)
+    end = np.fmax.reduce(running, axis=-1)
     with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
         change = on_arrays.log(np.abs(ratio))
         means = _means(running)
         rise, k = _rise(means)
         fall, k_log = _power(np.abs(change))
-        last, left = change[..., -2], np.abs(ratio * energy[..., None])[..., -2]
+        last, left = change[..., -1], np.abs(ratio * energy[..., None])[..., -1]
         gone = (left < th.SMALLEST_NORMAL) & (np.abs(energy) > th.SMALLEST_NORMAL)
         last_rise = _last_rise(running)
     size = np.where(np.isfinite(end) & (end > 0), end, 1.0)
@@ -190,7 +204,7 @@ def drift_of(
     closer = ~(np.abs(k_log - 1.0) >= np.abs(k - 1.0))
     exponential = (np.abs(last) > th.LARGE_CHANGE) & _is_near(k_log, 1) & closer
     short = (periods < th.LEAST_PERIODS) | (samples < th.LEAST_SAMPLES)
-    unknown = ~np.isfinite(end) | np.isnan(running[..., -2])
+    unknown = ~np.isfinite(end) | np.isnan(running[..., -1])
     rules = [
         (unknown, UNCLEAR),
         (end <= allowed, NONE),
@@ -233,8 +247,7 @@ def _is_still(rise: Floats, k: Floats, size: Floats) -> Flags:
 def _range(deviation: Floats) -> Floats:
     """Return the largest minus the least deviation so far, including 0 at the start."""
     inner = deviation.copy()
-    # without the end points, whose velocities may be one-sided
-    inner[..., 0], inner[..., -1] = 0.0, inner[..., -2]
+    inner[..., 0] = 0.0
     highest, lowest = (f.accumulate(inner, axis=-1) for f in (np.maximum, np.minimum))
     return np.asarray(highest - lowest)
 
@@ -247,7 +260,7 @@ def _shifts_the_range(deviation: Floats) -> Flags:
     n = deviation.shape[-1] - 1
     if n < th.LEAST_SAMPLES:
         return np.ones(deviation.shape[:-1], dtype=bool)
-    third, last = deviation[..., n // 2 : 3 * n // 4], deviation[..., 3 * n // 4 : n]
+    third, last = deviation[..., n // 2 : 3 * n // 4], deviation[..., 3 * n // 4 :]
     with np.errstate(over="ignore", invalid="ignore"):
         high, low = (f(last, axis=-1) - f(third, axis=-1) for f in (np.max, np.min))
     slower, faster = (f(np.abs(high), np.abs(low)) for f in (np.minimum, np.maximum))
@@ -256,12 +269,9 @@ def _shifts_the_range(deviation: Floats) -> Flags:
 
 def _last_rise(values: Floats) -> Floats:
     """Return an estimate of m1 - m2 from the means over the last two eighths, exact for k = 1."""
-    n = max(values.shape[-1] - 1, 1)
+    n = values.shape[-1]
     width = max(n // 8, 1)
-    last, previous = (
-        values[..., n - width : n],
-        values[..., max(n - 2 * width, 0) : max(n - width, 1)],
-    )
+    last, previous = values[..., n - width :], values[..., max(n - 2 * width, 0) : n - width]
     return np.asarray(3.0 * (np.mean(last, axis=-1) - np.mean(previous, axis=-1)))
 
 
@@ -287,9 +297,8 @@ def _power(values: Floats) -> tuple[Floats, Floats]:
 def _means(values: Floats) -> Floats:
     """Return m3, m2 and m1, along a new last dimension in place of the time."""
     n = values.shape[-1] - 1
-    # each includes its last point, except at the end of the run
-    windows = [(n // 8, n // 4 + 1), (n // 4, n // 2 + 1), (n // 2, max(n, n // 2 + 1))]
-    return np.stack([np.mean(values[..., a:b], axis=-1) for a, b in windows], axis=-1)
+    windows = [(n // 8, n // 4), (n // 4, n // 2), (n // 2, n)]
+    return np.stack([np.mean(values[..., a : b + 1], axis=-1) for a, b in windows], axis=-1)
 
 
 def _rise(means: Floats) -> tuple[Floats, Floats]:

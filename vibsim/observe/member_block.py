@@ -22,7 +22,7 @@ from vibsim.core.array_types import Flags, Floats
 from vibsim.core.record import Record
 from vibsim.core.vocabulary import CENTRED, HIGHEST, NORMS, TYPICAL_NORM, plain_name
 from vibsim.experiment import Experiment
-from vibsim.experiment.sweep_columns import Columns, recorded_columns
+from vibsim.experiment.sweep_columns import Columns, by_options, recorded_columns
 from vibsim.models import BUDGET, ENERGIES, Model
 from vibsim.observe import event_at_end
 from vibsim.observe.common_grid import Grid, check_belonging, common_grid, take
@@ -94,6 +94,13 @@ class MemberBlock:
             for place in self.ends():
                 values[..., place] = np.where(exists, 0.0, np.nan)
         return series
+
+    def has_own_end(self) -> Flags:
+        """Tell whether the velocity at the last point is computed like all others, shape (scheme, case)."""
+        own = by_options(
+            self.experiment, self.columns, lambda scheme, o: scheme.has_own_end(self.model, o)
+        )
+        return np.broadcast_to(own != 0.0, self.shape)
 
     def ends(self) -> list[int]:
         """Return the indices of the first and the last step on the common grid, if they are on it."""

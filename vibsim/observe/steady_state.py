@@ -10,7 +10,8 @@ where the end T is a whole number of periods P = 2 pi/w, so that ``w t_j = 2 pi 
 the sum is exact apart from the harmonics n - 1, n + 1, ..., which are smaller than any power of the sampling step.
 Every level uses all its samples, but no more than a finer level has: with the few common ones these harmonics would not
 be negligible, and what is left of the start adds an error of second order in the sampling step, which must fall from
-level to level.
+level to level. Where the velocity at the end has a formula of its own, u_n there is that of the period before, and the
+change since then of the samples before, on a straight line.
 
 Source: A. H. Nayfeh, D. T. Mook, Nonlinear Oscillations (Wiley, 1979), section 4.1, for the response of driven
 oscillators; L. N. Trefethen, J. A. C. Weideman, The exponentially convergent trapezoidal rule, SIAM Review 56 (2014)
@@ -61,6 +62,11 @@ def harmonic(block: MemberBlock, level: int, quantity: str, back: int = 0) -> Co
     strides = block.grid.strides[block.grid.levels.index(level) :]
     n *= min(strides)
     series = take_all(block.grid, record, quantity)[..., :: strides[0] // min(strides)]
+    if quantity not in block.model.positions and series.shape[-1] > 2 * n:
+        change = series[..., -3:-1] - series[..., -3 - n : -1 - n]
+        repeated = series[..., -1 - n] + (2.0 * change[..., 1] - change[..., 0])
+        series = np.array(series)
+        series[..., -1] = np.where(block.has_own_end(), series[..., -1], repeated)
     stop = series.shape[-1] - back * n
     samples = series[..., stop - n - 1 : stop]
     angle = 2.0 * np.pi / n * np.arange(n + 1)
@@ -132,7 +138,17 @@ def amplitude(block: MemberBlock, level: int, quantity: str) -> Floats:
 def phase(block: MemberBlock, level: int, quantity: str) -> Floats:
     """Return the angle by which the harmonic lags behind ``cos(w t)`` [rad]."""
     c = harmonic(block, level, quantity)
-    return np.asarray(-on_arrays.atan2(c.imag, c.real))
+    return wrapped(-on_arrays.atan2(c.imag, c.real))
+
+
+def wrapped(angle: Floats) -> Floats:
+    """Return angles in (-pi, pi]."""
+    return np.asarray(angle - TURN * np.ceil((angle - np.pi) / TURN))
+
+
+def continued(angle: Floats, to: Floats | float) -> Floats:
+    """Return angles, by whole turns, within half a turn of others."""
+    return np.asarray(angle - TURN * np.round((angle - to) / TURN))
 
 
 def change(block: MemberBlock, level: int, quantity: str) -> Floats:

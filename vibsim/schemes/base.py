@@ -260,6 +260,11 @@ class Scheme:
         treatment = str(options.get(EVENTS.name, EVENTS.default))
         return replace(stepper, events=treatment, own_velocity=False, staggered=False)
 
+    def has_own_end(self, model: Model, options: Options) -> bool:
+        """Tell whether the velocity at the last point is computed like all others."""
+        is_table = self.adaptive or model.loaded is not None
+        return is_table or self.stepper_for(model, options).end == "own"
+
     def formal_order(
         self,
         quantity: str,

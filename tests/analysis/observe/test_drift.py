@@ -229,3 +229,30 @@ def test_a_run_that_broke_down_conserves_nothing() -> None:
     run = spring(["euler_cromer"], check, claim, time=time)
     assert [v.reason for v in run.verdicts] == ["non_finite", "non_finite"]
     assert [v.status for v in run.verdicts] == ["FAIL", "FAIL"]
+
+
+def test_the_last_time_counts_where_its_velocity_is_that_of_all_others() -> None:
+    """Of Forward Euler and RK4 the energy changes by a known factor at each step: the last error is the largest."""
+    steps = 64
+    check = {"id": "kept", "conserves": "energy", "drift": "none"}
+    run = spring(
+        [
+            "forward_euler",
+            "rk4",
+            "central",
+            {"kind": "central", "end_velocity": "kick", "label": "kick"},
+        ],
+        check,
+        model={"kind": "spring", "w": 1.0},
+        time={"end": 1.5, "base_steps": steps},
+    )
+    p = 1.5 / steps
+    growth = np.array([1.0 + p * p, 1.0 - p**6 / 72.0 + p**8 / 576.0]) ** steps
+    found = run.record["check_kept_energy_error"][:, 0]
+    assert found[:2] == pytest.approx(np.abs(growth - 1.0), rel=1e-10)
+    # the largest energy error of centred differences is that of the velocity without the extrapolated one at the end
+    energies = np.abs(run.levels[0]["energy_deviation"][:, 0])
+    initial = run.levels[0]["energy_initial"][:, 0]
+    assert found[2] == pytest.approx(np.max(energies[2, :-1]) / initial[2], rel=1e-12)
+    assert found[3] == pytest.approx(np.max(energies[3]) / initial[3], rel=1e-12)
+    assert found[2] < found[3]

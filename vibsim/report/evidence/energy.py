@@ -15,6 +15,7 @@ from vibsim.checks.fields import name_of
 from vibsim.core.array_types import Floats
 from vibsim.core.record import Record
 from vibsim.core.vocabulary import CENTRED, DRIFTS
+from vibsim.experiment.sweep_columns import options_of, recorded_columns
 from vibsim.observe.thresholds import LEAST_PERIODS, LEAST_SAMPLES, STILL
 from vibsim.report import style
 from vibsim.report.data import Member, at, time_label, times, unit, whole
@@ -54,7 +55,7 @@ class EnergyError:
 
 
 def picture(
-    _: Experiment, record: Record, check: ConservesCheck, name: str, member: Member
+    experiment: Experiment, record: Record, check: ConservesCheck, name: str, member: Member
 ) -> Picture | None:
     """Draw the running maximum of the energy error beside the drift that a check expects."""
     series = f"{check.about}_running_max"
@@ -65,13 +66,17 @@ def picture(
         for field in ("level", "drift", "drift_rate", "drift_power")
     )
     initial = abs(float(at(record, "energy_initial", member)))
-    running = at(record, series, member, level=whole(record, "level").index(int(level)))
+    running = at(record, series, member, level=whole(record, "level").index(int(level))).copy()
+    options = options_of(experiment, recorded_columns(record), member.scheme, member.case)
+    scheme = experiment.schemes[member.scheme].method
+    if not scheme.has_own_end(experiment.model.definition, options):
+        # the verdict leaves out a velocity with a formula of its own
+        running[-1] = np.nan
     error = EnergyError(
         kind=DRIFTS[int(kind)],
         expected=check.drift,
         t=times(record, member.case),
-        # the verdict ignores the last velocity, which may be one-sided
-        running=np.append(running[:-1], np.nan) / (initial or 1.0),
+        running=running / (initial or 1.0),
         means=at(record, name_of(name, "window_means"), member) / (initial or 1.0),
         round_off=measured(record, name, "round_off", member) / (initial or 1.0),
         power=power,

@@ -6,7 +6,7 @@ An extrapolated number is drawn to the right of the levels, with the bound of it
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -17,6 +17,7 @@ from vibsim.core.array_types import Floats
 from vibsim.core.record import Record
 from vibsim.core.vocabulary import OF_LEVEL
 from vibsim.experiment.value_names import OF_ONE_MEMBER
+from vibsim.observe.steady_state import continued
 from vibsim.report import style, words
 from vibsim.report.data import Member, at, norm_unit, pretty_unit, unit, whole
 from vibsim.report.evidence import frame
@@ -39,6 +40,9 @@ def picture(
     if by_level is None or not np.isfinite(by_level[0]).any():
         return None
     row = _row(record, check, name, member, by_level[0])
+    if check.number.is_angle:
+        near = row.values[-1] if check.equals is None else check.equals
+        row = replace(row, values=continued(row.values, near))
     values, title, number = row.values, style.label(_number_title(check), by_level[1]), words.number
     if not np.isfinite(values[row.counts]).any():
         return None
