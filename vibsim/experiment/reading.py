@@ -182,7 +182,7 @@ def _equation_and_setting(
 ) -> tuple[Equation, Numbers, size_limits.Setting]:
     """Return the equation, its (scaled) numbers, and the setting that checks and size limits are validated against."""
     data = report.source.data
-    swept = sorted(set(_keys(data.get("sweep"))))
+    swept = sorted(set(_dotted_keys(data.get("sweep"))))
     # a faulty model section may still name its model
     registered = report.kinds.model_of(data.get("model"))
     equation = read_equation(document.model, registered, swept, folder, report)
@@ -266,11 +266,12 @@ def check_names(experiment: str, collection: str, report: Report) -> None:
             report.add((), f"{who} must not end with the same text {MAX_REPEATS} times")
 
 
-def _keys(section: Any) -> Iterator[str]:
+def _dotted_keys(section: Any) -> Iterator[str]:
+    """Yield the keys of a sweep at any depth: one at the wrong place is meant to vary, too."""
     if isinstance(section, Mapping):
         for key, value in section.items():
-            yield str(key)
-            yield from _keys(value)
+            yield from [key] if "." in key else ()
+            yield from _dotted_keys(value)
 
 
 def _levels(document: Any, report: Report) -> tuple[int, ...]:

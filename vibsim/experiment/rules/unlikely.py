@@ -17,6 +17,7 @@ from vibsim.experiment.rules.members import MemberNumbers
 from vibsim.experiment.rules.size_limits import Setting
 from vibsim.experiment.schema.checks import AccurateCheck, Check, ConvergesCheck, ValueCheck
 from vibsim.experiment.schema.fields import DECLARED
+from vibsim.experiment.schema.sweep import swept_values
 from vibsim.experiment.schema.unit_text import split
 from vibsim.experiment.value_names import OF_THE_SAME_KIND, VALUES
 from vibsim.experiment.yaml.parse import Path_
@@ -197,10 +198,7 @@ def _warn_repeated(report: Report) -> None:
 
 def _warn_set_and_swept(report: Report) -> None:
     """Warn about a value of the command line without effect, because the file sweeps its key."""
-    keys: set[str] = set()
-    for path in ((), ("zip",), ("sample", "over")):
-        section = _at_path(report.source.data, ("sweep", *path))
-        keys |= set(section) if isinstance(section, Mapping) else set()
+    keys = {path[-1] for path, _ in swept_values(report.source.data.get("sweep"))}
     for text in report.source.settings:
         key = text.partition("=")[0].strip()
         if key in keys:
@@ -217,13 +215,9 @@ def _at_path(content: Any, path: Path_) -> Any:
 
 def _unitless_starts(data: Mapping[str, Any], name: str) -> Iterator[tuple[Path_, list[float]]]:
     """Yield the paths of an initial value, in its section and in the sweep, with the unitless numbers there."""
-    for path in (
-        ("initial", name),
-        ("sweep", f"initial.{name}"),
-        ("sweep", "zip", f"initial.{name}"),
-        ("sweep", "sample", "over", f"initial.{name}"),
-    ):
-        value = _at_path(data, path)
+    start: tuple[Path_, Any] = ("initial", name), _at_path(data, ("initial", name))
+    swept = (row for row in swept_values(data.get("sweep")) if row[0][-1] == f"initial.{name}")
+    for path, value in (start, *swept):
         if isinstance(value, Mapping):
             # the first two numbers of a rule are values
             value = [x for rule in value.values() if isinstance(rule, list) for x in rule[:2]]
