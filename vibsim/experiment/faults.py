@@ -114,9 +114,8 @@ class Report:
             # a comma between braces has cut a formula in two
             hint = "between braces a comma ends a value: write a formula with commas in quotation marks"
         place = self.source.place(path)
-        nested = place is not None and not place.text
         file, line = self._nearest_place(path)
-        if place and not (at_key or nested or place.setting):
+        if place and place.text and not (at_key or place.setting):
             line = place.line
         written, origin = "" if value is None else _as_yaml(value), self.source.origin(path)
         if place and place.text and not (written and origin):
