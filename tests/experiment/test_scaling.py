@@ -129,9 +129,15 @@ def test_options_of_schemes_may_be_swept():
     assert scaled.alone(1).scaling == scaled.scaling
 
 
+def test_options_of_schemes_may_vary_together():
+    options = {"schemes.central.start": ["centred", "taylor"]}
+    assert pair(sweep={"zip": options})[1].members == 2
+
+
 @pytest.mark.parametrize("key", ["model.g", "initial.theta", "time.end"])
-def test_sweeps_that_change_the_scales_are_refused(key):
-    fault = only_fault(scaled=True, sweep={key: [1.0, 2.0]})
+@pytest.mark.parametrize("values", [[1.0, 2.0], {"linspace": [1.0, 2.0, 3]}])
+def test_sweeps_that_change_the_scales_are_refused(key, values):
+    fault = only_fault(scaled=True, sweep={key: values})
     assert (fault.key, fault.value) == ("scaled", "")
     assert f"must not be given where {key} is swept" in fault.rule
 

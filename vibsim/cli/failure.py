@@ -45,11 +45,8 @@ def from_here(text: str) -> str:
 def sentence(error: Exception) -> str:
     """Return the message of an error; for a fault of vibsim itself, it says where the traceback is.
 
-    Raises
-    ------
-    Interrupted
-        Where a signal requested this process to end: a library may have turned the Interrupted that was raised inside
-        it into an error of its own.
+    Raises Interrupted where a signal requested this process to end: a library may have turned the Interrupted that was
+    raised inside it into an error of its own.
     """
     check_interrupted()
     if isinstance(error, VibsimError):

@@ -23,13 +23,7 @@ Row = tuple[str, str]
 
 
 def in_full(what: str, name: str) -> list[str]:
-    """Return the lines that describe a model or a scheme.
-
-    Raises
-    ------
-    InputError
-        Where the name is unknown; it suggests the nearest one.
-    """
+    """Return the lines that describe a model or a scheme; raise InputError if there is none of this name."""
     rows = scheme_rows(scheme_named(name)) if what == "schemes" else model_rows(model_named(name))
     return laid_out(rows)
 

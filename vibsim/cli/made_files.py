@@ -160,10 +160,7 @@ def replace(results: Path, key: str, entries: Mapping[str, Entry]) -> None:
 def content(file: Path) -> str:
     """Return the digest of a file, computed from its bytes.
 
-    Raises
-    ------
-    DamagedFileError
-        Where a netCDF file does not match its seal.
+    Raises DamagedFileError where a netCDF file does not match its seal.
     """
     if file.suffix == ".nc":
         seal.check(file)

@@ -15,13 +15,7 @@ from vibsim.store.atomic import check_room
 
 
 def check(plans: Sequence[Plan], results: Path) -> None:
-    """Refuse plans that need more memory or disk than the machine has.
-
-    Raises
-    ------
-    InputError
-        States what is needed and what is available.
-    """
+    """Refuse plans that need more memory or disk than the machine has."""
     needed, free = _missing_bytes(plans, results), free_bytes(results)
     total = psutil.virtual_memory().total
     problems = [

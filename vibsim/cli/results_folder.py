@@ -27,13 +27,7 @@ _NEEDED = ("incomplete", "log", "metadata")
 
 
 def check(results: Path, keys: Iterable[str]) -> None:
-    """Refuse links, pipes and devices wherever runs of the experiments `keys` read or write.
-
-    Raises
-    ------
-    InputError
-        Lists every path that is neither a regular file nor a folder.
-    """
+    """Refuse all links, pipes and devices wherever runs of the experiments `keys` read or write."""
     paths = [results / name for name in (*_OURS, *keys)]
     with _naming():
         entries = (entry for path in paths for entry in _entries(path, deep=True))
@@ -138,10 +132,8 @@ def _naming() -> Iterator[None]:
 def delete(error: FileError, results: Path) -> None:
     """Delete the file that `error` names and leave a note, so that the run makes it again.
 
-    Raises
-    ------
-    VibsimError
-        Where the path is a folder that is not empty, which vibsim may not delete, or the note cannot be written.
+    Raises VibsimError where the path is a folder that is not empty, which vibsim may not delete, or the note cannot be
+    written.
     """
     try:
         if error.path.is_dir() and not error.path.is_symlink():

@@ -16,6 +16,8 @@ from vibsim.plan import Names
 def names_of(config: Mapping[str, Any], command_line: Mapping[str, Any]) -> Names:
     """Return the names for the workflow.
 
+    Raises InputError where an experiment file or the results folder is refused, or a program is not allowed to run.
+
     Parameters
     ----------
     config
@@ -24,11 +26,6 @@ def names_of(config: Mapping[str, Any], command_line: Mapping[str, Any]) -> Name
         `vibsim.core.home.default_results`; and ``cores``, ``overhead`` and ``here`` as in `vibsim.plan.Names`.
     command_line
         The values of ``--config`` on the command line alone: ``allow_commands=true`` lets users' programs run.
-
-    Raises
-    ------
-    InputError
-        Where an experiment file or the results folder is refused, or a program is not allowed to run.
     """
     is_allowed = str(command_line.get("allow_commands")).lower() == "true"
     experiments, settings = (

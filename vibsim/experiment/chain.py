@@ -59,11 +59,12 @@ def write_out_chain(report: Report) -> None:
         defined = {**dict.fromkeys(map(str, others)), **parameters}
         walls = {name: 0.0 for name in _walls([chain, model], count) if name not in defined}
         model["parameters"] = {**walls, **parameters}
-        writer.origins |= {("model", "parameters", wall): ("model", REPEAT) for wall in walls}
+        for wall in walls:
+            report.move(("model", REPEAT), ("model", "parameters", wall))
     content = {**data, "model": model}
     if isinstance(data.get("initial"), Mapping):
         content["initial"] = writer.value(("initial",), data["initial"])
-    report.rewrite(content, writer.origins)
+    report.rewrite(content)
 
 
 def _count(raw: Any, report: Report) -> int:
@@ -81,7 +82,6 @@ class _Writer:
     def __init__(self, index: str, report: Report) -> None:
         self.index = i = index
         self.report = report
-        self.origins: dict[Path_, Path_] = {}
         self._after_name = re.compile(rf"(?<=\w)_(?:{i}(?!\w)|\(\s*{i}\s*([+-]\s*\d+)?\s*\))")
         self._alone = re.compile(rf"(?<![\w{{]){i}(?![\w}}(])")
         self._unclear = re.compile(rf"\w_{i}[+-]\d+(?![\w.])")
@@ -96,7 +96,7 @@ class _Writer:
                 rule = f"must hold the index {self.index} behind _"
                 self.report.add_malformed(path, rule, f"e.g. {key}_{self.index}", at_key=True)
                 name = f"{key}_{{{self.index}}}"
-            self.origins["model", "coordinates", name] = path
+            self.report.move(path, ("model", "coordinates", name))
             coordinates[name] = self.value(path, formulas, always=True)
         return coordinates
 
@@ -107,7 +107,7 @@ class _Writer:
             for key, value in raw.items():
                 name = self.text((*path, key), str(key), always=always)
                 if name != key:
-                    self.origins[*path, name] = (*path, key)
+                    self.report.move((*path, key), (*path, name))
                 rewritten[name] = self.value((*path, key), value, always=always or name != key)
             return rewritten
         if isinstance(raw, list | tuple):

@@ -59,11 +59,6 @@ class TableSpec(Section):
         self._table, self._content = table, content
 
     @property
-    def content(self) -> str:
-        """SHA-256 of the bytes of the file when it was read."""
-        return self._content
-
-    @property
     def table(self) -> Table:
         """The numbers, attached by `vibsim.experiment.tables.file.attach`."""
         if self._table is None:
@@ -106,11 +101,6 @@ class StructureSpec(Section):
         self._structure, self._files = structure, files
 
     @property
-    def files(self) -> tuple[tuple[str, str], ...]:
-        """Path of each file, and SHA-256 of its bytes when it was read."""
-        return self._files
-
-    @property
     def structure(self) -> Structure:
         """The numbers, attached by `vibsim.experiment.tables.structure.attach`."""
         if self._structure is None:
@@ -144,8 +134,8 @@ class ModelSpec(Section):
     @property
     def files(self) -> tuple[tuple[str, str], ...]:
         """Path of each file that the section names, and SHA-256 of its bytes when it was read."""
-        tables = tuple((row.file, row.content) for row in self.tables.values())
-        return (*tables, *(self.structure.files if self.structure is not None else ()))
+        tables = tuple((row.file, row._content) for row in self.tables.values())
+        return tables + (self.structure._files if self.structure is not None else ())
 
     @property
     def base(self) -> Model:

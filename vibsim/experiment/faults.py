@@ -37,6 +37,7 @@ _RULES = {
     "model_attributes_type": "must be a mapping",
     "bool_type": "must be true or false",
 }
+_OF_FORM = ("tuple_type", "dict_type", "model_type", "model_attributes_type", "string_type")
 _FORMS = {
     "linspace": "must be [first, last, count]",
     "logspace": "must be [first, last, count]",
@@ -85,6 +86,7 @@ class Report:
         """Paths of malformed values; no further fault is reported there."""
         self._expanded: set[Path_] = set()
         """Paths of the file that `repeat` expanded and that have a fault already; only the first copy is reported."""
+        self._moved: dict[Path_, Path_] = {}
 
     def add(
         self, path: Path_, rule: str, hint: str = "", value: object = None, at_key: bool = False
@@ -112,9 +114,8 @@ class Report:
             # a comma between braces has cut a formula in two
             hint = "between braces a comma ends a value: write a formula with commas in quotation marks"
         place = self.source.place(path)
-        nested = place is not None and not place.text
         file, line = self._nearest_place(path)
-        if place and not (at_key or nested or place.setting):
+        if place and place.text and not (at_key or place.setting):
             line = place.line
         written, origin = "" if value is None else _as_yaml(value), self.source.origin(path)
         if place and place.text and not (written and origin):
@@ -198,13 +199,7 @@ class Report:
                 hint = f"an initial value cannot name {named[0]}: write the number; zip of a sweep varies both"
         if kind == "literal_error":
             hint = nearest(value, re.findall(r"'([^']*)'", context["expected"]))
-        if kind in (
-            "tuple_type",
-            "dict_type",
-            "model_type",
-            "model_attributes_type",
-            "string_type",
-        ):
+        if kind in _OF_FORM:
             hint = _EXAMPLES.get(path) or _EXAMPLES.get(path[-1], hint)
         if kind in ("missing", "too_long", "tuple_type"):
             path, rule = _whole_list(path, rule)
@@ -267,11 +262,14 @@ class Report:
             self.add(path, f"{error.rule}{place}{suffix}", hint, text)
             return None
 
-    def rewrite(self, data: Any, origins: Mapping[Path_, Path_]) -> None:
-        """Replace the content; `origins` holds the former path of every value that moved."""
-        source = self.source
-        moved = {path: source.origin(before) or before for path, before in origins.items()}
-        self.source = replace(source, data=data, origins={**source.origins, **moved})
+    def move(self, before: Path_, path: Path_) -> None:
+        """Record that the value at `before` is at `path` in the content that `rewrite` gets next."""
+        self._moved[path] = self.source.origin(before) or before
+
+    def rewrite(self, data: Any) -> None:
+        """Replace the content."""
+        origins = {**self.source.origins, **self._moved}
+        self.source, self._moved = replace(self.source, data=data, origins=origins), {}
 
     def raise_any(self) -> None:
         """Raise `InputError` with all faults, if there are any."""

@@ -12,7 +12,7 @@ from typing import Any
 from vibsim.core.errors import Fault, InputError, nearest
 from vibsim.experiment.chain import write_out_chain
 from vibsim.experiment.collection import collection_of
-from vibsim.experiment.data import ExperimentSpec, ModelSpec, Sweep, TimeSpec
+from vibsim.experiment.data import ExperimentSpec, Sweep, TimeSpec
 from vibsim.experiment.faults import MISSING, Report, shorten
 from vibsim.experiment.kinds import Kinds
 from vibsim.experiment.repeat import write_out_repeats
@@ -20,7 +20,7 @@ from vibsim.experiment.rules import continuation, members, size_limits, timing, 
 from vibsim.experiment.rules import schemes as scheme_rules
 from vibsim.experiment.rules.checks import finish_checks
 from vibsim.experiment.rules.figures import check_figures
-from vibsim.experiment.rules.model import Equation, has_all_values
+from vibsim.experiment.rules.model import Equation
 from vibsim.experiment.rules.model import equation as read_equation
 from vibsim.experiment.rules.published import check_published
 from vibsim.experiment.rules.scaling import Numbers, characteristic
@@ -149,7 +149,7 @@ def build(
         collection=collection,
         name=name,
         **{key: getattr(document, key) for key in AS_WRITTEN},
-        model=_model_spec(equation, numbers.parameters),
+        model=equation.spec(numbers.parameters),
         initial=dict(numbers.initial),
         time=setting.time,
         levels=setting.levels,
@@ -172,7 +172,7 @@ def build(
         setting.time,
         setting.sweep.axes,
     )
-    unlikely.note_unlikely(document.checks, setting, every, report)
+    unlikely.note_unlikely(document.checks, setting.levels, every, report)
     experiment._notes = report.note_lines
     return members.update_tables(experiment)
 
@@ -182,7 +182,7 @@ def _equation_and_setting(
 ) -> tuple[Equation, Numbers, size_limits.Setting]:
     """Return the equation, its (scaled) numbers, and the setting that checks and size limits are validated against."""
     data = report.source.data
-    swept = sorted(set(_keys(data.get("sweep"))))
+    swept = sorted(set(_dotted_keys(data.get("sweep"))))
     # a faulty model section may still name its model
     registered = report.kinds.model_of(data.get("model"))
     equation = read_equation(document.model, registered, swept, folder, report)
@@ -190,10 +190,8 @@ def _equation_and_setting(
     levels = _levels(document, report)
     schemes = tuple(scheme_rules.finish_schemes(document.schemes, model, report))
     knows_schemes = scheme_rules.are_known(document.schemes, report.kinds)
-    time = timing.time_spec(document.time, model, parameters, report)
-    # the states of a structure are known only once its matrices are
-    fallback = None if registered is STRUCTURE else registered
-    initial = _initial(document.initial, model or fallback, parameters, report)
+    time = timing.time_spec(document.time, equation.valued, parameters, report)
+    initial = _initial(document.initial, equation, registered, report)
     sweep, is_whole = read_sweep(document, model, schemes, not knows_schemes, report)
     if is_whole:
         _check_members(equation, initial, time, sweep, report)
@@ -215,21 +213,6 @@ def _equation_and_setting(
     return equation, numbers, setting
 
 
-def _model_spec(equation: Equation, parameters: Mapping[str, float]) -> ModelSpec:
-    """Return the model of an experiment whose equation was read without fault."""
-    model = equation.model
-    assert model is not None
-    return ModelSpec(
-        kind=model.kind,
-        parameters=dict(parameters),
-        formulas=equation.formulas,
-        coordinates=model.positions if model.named is not None else (),
-        tables=equation.tables,
-        terms=equation.terms,
-        structure=equation.structure,
-    )
-
-
 def _check_members(
     equation: Equation,
     initial: Mapping[str, float],
@@ -238,10 +221,10 @@ def _check_members(
     report: Report,
 ) -> None:
     """Check the rules that every member of a sweep must satisfy, if all of its numbers are known."""
-    model, parameters = equation.model, equation.parameters
-    if time is None or model is None or not has_all_values(model, parameters):
+    model = equation.valued
+    if time is None or model is None:
         return
-    numbers = members.MemberNumbers(model, parameters, initial, time, sweep.axes)
+    numbers = members.MemberNumbers(model, equation.parameters, initial, time, sweep.axes)
     members.check_ends(numbers, report)
     for table in equation.tables:
         members.check_table_length(numbers, table, report)
@@ -266,11 +249,12 @@ def check_names(experiment: str, collection: str, report: Report) -> None:
             report.add((), f"{who} must not end with the same text {MAX_REPEATS} times")
 
 
-def _keys(section: Any) -> Iterator[str]:
+def _dotted_keys(section: Any) -> Iterator[str]:
+    """Yield the keys of a sweep at any depth: one at the wrong place is meant to vary, too."""
     if isinstance(section, Mapping):
         for key, value in section.items():
-            yield str(key)
-            yield from _keys(value)
+            yield from [key] if "." in key else ()
+            yield from _dotted_keys(value)
 
 
 def _levels(document: Any, report: Report) -> tuple[int, ...]:
@@ -285,9 +269,11 @@ def _levels(document: Any, report: Report) -> tuple[int, ...]:
 
 
 def _initial(
-    given: Mapping[str, float], model: Model | None, parameters: Mapping[str, float], report: Report
+    given: Mapping[str, float], equation: Equation, registered: Model | None, report: Report
 ) -> dict[str, float]:
-    """Return the initial value of every state, 0 by default."""
+    """Return the initial value of every state, 0 by default; with a faulty equation those of the registered model."""
+    # the states of a structure are known only once its matrices are
+    model = equation.model or (None if registered is STRUCTURE else registered)
     if model is None:
         return {}
     states = [state.name for state in model.states]
@@ -299,7 +285,7 @@ def _initial(
         if state.minimum is not None and initial[state.name] < state.minimum:
             rule = f"must be at least {state.minimum:g}"
             report.add(("initial", state.name), rule, value=initial[state.name])
-    start = model.start(parameters) if model.start and has_all_values(model, parameters) else {}
+    start = model.start(equation.parameters) if equation.valued and model.start else {}
     scale = max(map(abs, start.values()), default=0.0)
     for name, value in start.items():
         agrees = math.isclose(initial[name], value, rel_tol=SAME_START, abs_tol=SAME_START * scale)

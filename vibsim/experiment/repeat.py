@@ -43,7 +43,7 @@ def write_out_repeats(report: Report) -> None:
     expanded = {**data, "model": writer.mapping(("model",), model, ("model",))}
     if isinstance(starts, Mapping):
         expanded["initial"] = writer.mapping(("initial",), starts, ("initial",))
-    report.rewrite(expanded, writer.origins)
+    report.rewrite(expanded)
 
 
 def _indices(raw: Any, report: Report) -> dict[str, range]:
@@ -78,8 +78,6 @@ class _Writer:
 
     def __init__(self, indices: Mapping[str, range], report: Report) -> None:
         self.indices, self.report = indices, report
-        self.origins: dict[Path_, Path_] = {}
-        """Path in the file of every expanded key or entry, by its expanded path."""
 
     def mapping(
         self,
@@ -98,7 +96,7 @@ class _Writer:
                 name = self._put((*path, key), str(key), values)
                 if name == key or name not in raw:
                     if values:
-                        self.origins[*out, name] = (*path, key)
+                        self.report.move((*path, key), (*out, name))
                     expanded[name] = self._value((*path, key), value, values, (*out, name))
         return expanded
 
@@ -110,7 +108,7 @@ class _Writer:
         items: list[Any] = []
         for i, item in enumerate(value):
             for own in self._values(item, {}) if isinstance(item, str) else [{}]:
-                self.origins[*out, len(items)] = (*path, i)
+                self.report.move((*path, i), (*out, len(items)))
                 items.append(self._put((*path, i), item, own) if isinstance(item, str) else item)
         return items
 

@@ -16,6 +16,7 @@ from typing import Any
 
 from vibsim.core.errors import likely
 from vibsim.experiment.faults import Report
+from vibsim.experiment.schema.sweep import swept_values
 from vibsim.experiment.yaml.parse import Path_
 from vibsim.formula import (
     CONSTANTS,
@@ -48,104 +49,95 @@ def write_usual_form(report: Report) -> None:
     data = report.source.data
     if not isinstance(data, Mapping) or not isinstance(section := data.get("model"), Mapping):
         return
-    writer = _Writer(report)
-    model = writer.of_structure(section) if section.get("kind") == "structure" else dict(section)
-    if section.get("kind") == "system":
-        model = writer.of_equation(writer.of_coordinates(model))
+    is_structure, is_system = (section.get("kind") == kind for kind in ("structure", "system"))
+    model = _with_words(section, report) if is_structure else dict(section)
+    if is_system:
+        model = _with_acceleration(_with_formulas(model, report), report)
     content = {key: value for key, value in data.items() if key not in BESIDE_MODEL}
     if isinstance(checks := data.get("checks"), list | tuple):
         content["checks"] = [_with_swept_key(check, data.get("sweep")) for check in checks]
     known = report.kinds.model(section.get("kind"))
     for key in (key for key in BESIDE_MODEL if key in data):
         if known is None or known.takes_events:
-            model = writer.moved(model, key, data[key], (key,))
+            model = _with_moved(model, key, data[key], (key,), report)
         else:
             rule = f"the model {known.kind} takes none"
             report.add_malformed((key,), rule, "`kind: system` does", at_key=True)
-    report.rewrite({**content, "model": model}, writer.origins)
+    report.rewrite({**content, "model": model})
 
 
-class _Writer:
-    """Rewrites a section ``model``, and records the paths of its values in the file."""
-
-    def __init__(self, report: Report) -> None:
-        self.report = report
-        self.origins: dict[Path_, Path_] = {}
-
-    def moved(self, model: dict[str, Any], key: str, value: Any, path: Path_) -> dict[str, Any]:
-        """Return a section with the value from `path` added under `key`; report a fault if the key exists."""
-        if key in model:
-            self.report.add_malformed(path, f"is also given under `model: {key}`", at_key=True)
-            return model
-        self.origins["model", key] = path
-        return {**model, key: value}
-
-    def of_structure(self, section: Mapping[str, Any]) -> dict[str, Any]:
-        """Return a structure with names in place of the letters of its matrices."""
-        model = {key: value for key, value in section.items() if key not in LETTERS}
-        for letter in section.keys() & LETTERS.keys():
-            model = self.moved(model, LETTERS[letter], section[letter], ("model", letter))
+def _with_moved(
+    model: dict[str, Any], key: str, value: Any, path: Path_, report: Report
+) -> dict[str, Any]:
+    """Return a section ``model`` with the value from `path` under `key`; report a fault if the key exists."""
+    if key in model:
+        report.add_malformed(path, f"is also given under `model: {key}`", at_key=True)
         return model
+    report.move(path, ("model", key))
+    return {**model, key: value}
 
-    def of_coordinates(self, model: dict[str, Any]) -> dict[str, Any]:
-        """Return a system with the formulas of its coordinates by name.
 
-        If one coordinate has a force, all need one: an acceleration becomes the force on mass 1.
-        """
-        coordinates = model.get("coordinates")
-        if not isinstance(coordinates, Mapping) or not all(
-            map(_has_formulas, coordinates.values())
-        ):
-            return model
-        known = {"coordinates", *OF_COORDINATE}
-        for key in (key for key in OF_COORDINATE if key in model):
-            rule = "is also given at the coordinates"
-            self.report.add_malformed(("model", key), rule, at_key=True)
-        by_force = any("force" in entry or "mass" in entry for entry in coordinates.values())
-        formulas: dict[str, dict[str, Any]] = {}
-        for i, (name, entry) in enumerate(coordinates.items()):
-            path: Path_ = ("model", "coordinates", name)
-            self.origins["model", "coordinates", i] = path
-            for key, value in entry.items():
-                if key not in OF_COORDINATE:
-                    rule = f"is not a formula of a coordinate: {', '.join(OF_COORDINATE)}"
-                    self.report.add_malformed((*path, key), rule, at_key=True)
-                    continue
-                is_plain_acceleration = key == "acceleration" and by_force and len(entry) == 1
-                if is_plain_acceleration:
-                    formulas.setdefault("mass", {})[name] = 1
-                target = "force" if is_plain_acceleration else key
-                formulas.setdefault(target, {})[name] = value
-                self.origins["model", target, name] = (*path, key)
-        return {
-            **{key: value for key, value in model.items() if key not in known},
-            "coordinates": list(coordinates),
-            **formulas,
-        }
+def _with_words(section: Mapping[str, Any], report: Report) -> dict[str, Any]:
+    """Return a structure with names in place of the letters of its matrices."""
+    model = {key: value for key, value in section.items() if key not in LETTERS}
+    for letter in section.keys() & LETTERS.keys():
+        model = _with_moved(model, LETTERS[letter], section[letter], ("model", letter), report)
+    return model
 
-    def of_equation(self, model: dict[str, Any]) -> dict[str, Any]:
-        """Return a system with its equation solved for the acceleration of the only coordinate."""
-        path: Path_ = ("model", EQUATION)
-        equation = model.get(EQUATION)
-        if isinstance(equation, Mapping):
-            rule = "must be the equation of one coordinate"
-            hint = "of several give each its `acceleration`, or `force` and `mass`"
-            self.report.add_malformed(path, rule, hint)
-            others = {key: value for key, value in model.items() if key != EQUATION}
-            return {**others, "acceleration": dict.fromkeys(map(str, equation), "0")}
-        if not isinstance(equation, str):
-            return model
-        try:
-            parameters = model.get("parameters")
-            known = [*parameters] if isinstance(parameters, Mapping) else []
-            name, acceleration = solved(equation, ["t", INPUT, *map(str, known)])
-        except ExpressionError as error:
-            self.report.add_malformed(path, error.rule, error.hint, equation)
-            acceleration, name = "0", "u"
-        others = {key: value for key, value in model.items() if key != EQUATION}
-        # u is the default coordinate, with velocity v
-        system = others if name == "u" else {"coordinates": [name], **others}
-        return self.moved(system, "acceleration", acceleration, path)
+
+def _with_formulas(model: dict[str, Any], report: Report) -> dict[str, Any]:
+    """Return a system with the formulas of its coordinates by name.
+
+    If one coordinate has a force, all need one: an acceleration becomes the force on mass 1.
+    """
+    coordinates = model.get("coordinates")
+    if not isinstance(coordinates, Mapping) or not all(map(_has_formulas, coordinates.values())):
+        return model
+    known = {"coordinates", *OF_COORDINATE}
+    for key in (key for key in OF_COORDINATE if key in model):
+        report.add_malformed(("model", key), "is also given at the coordinates", at_key=True)
+    by_force = any("force" in entry or "mass" in entry for entry in coordinates.values())
+    formulas: dict[str, dict[str, Any]] = {}
+    for i, (name, entry) in enumerate(coordinates.items()):
+        path: Path_ = ("model", "coordinates", name)
+        report.move(path, ("model", "coordinates", i))
+        for key, value in entry.items():
+            if key not in OF_COORDINATE:
+                rule = f"is not a formula of a coordinate: {', '.join(OF_COORDINATE)}"
+                report.add_malformed((*path, key), rule, at_key=True)
+                continue
+            is_plain_acceleration = key == "acceleration" and by_force and len(entry) == 1
+            if is_plain_acceleration:
+                formulas.setdefault("mass", {})[name] = 1
+            target = "force" if is_plain_acceleration else key
+            formulas.setdefault(target, {})[name] = value
+            report.move((*path, key), ("model", target, name))
+    others = {key: value for key, value in model.items() if key not in known}
+    return {**others, "coordinates": list(coordinates), **formulas}
+
+
+def _with_acceleration(model: dict[str, Any], report: Report) -> dict[str, Any]:
+    """Return a system with its equation solved for the acceleration of the only coordinate."""
+    path: Path_ = ("model", EQUATION)
+    equation = model.get(EQUATION)
+    others = {key: value for key, value in model.items() if key != EQUATION}
+    if isinstance(equation, Mapping):
+        rule = "must be the equation of one coordinate"
+        hint = "of several give each its `acceleration`, or `force` and `mass`"
+        report.add_malformed(path, rule, hint)
+        return {**others, "acceleration": dict.fromkeys(map(str, equation), "0")}
+    if not isinstance(equation, str):
+        return model
+    parameters = model.get("parameters")
+    known = map(str, parameters if isinstance(parameters, Mapping) else ())
+    try:
+        name, acceleration = solved(equation, ["t", INPUT, *known])
+    except ExpressionError as error:
+        report.add_malformed(path, error.rule, error.hint, equation)
+        acceleration, name = "0", "u"
+    # u is the default coordinate, with velocity v
+    system = others if name == "u" else {"coordinates": [name], **others}
+    return _with_moved(system, "acceleration", acceleration, path, report)
 
 
 def _with_swept_key(check: Any, sweep: Any) -> Any:
@@ -157,16 +149,15 @@ def _with_swept_key(check: Any, sweep: Any) -> Any:
     result = dict(check)
     if check.get("take") == "where":
         result["take"] = "where_largest"
-    if check.get("over") == "cases" and isinstance(sweep, Mapping):
+    if check.get("over") == "cases":
         fixed = check["at"] if isinstance(check.get("at"), Mapping) else {}
-        zipped, sample = sweep.get("zip"), sweep.get("sample")
-        keys = [key for key in sweep if "." in str(key) and key not in fixed]
-        if isinstance(sample, Mapping) and isinstance(sample.get("over"), Mapping):
-            keys += list(sample["over"])
-        if isinstance(zipped, Mapping) and not zipped.keys() & fixed.keys():
-            # keys that vary together count as one
-            keys += list(zipped)[:1]
-        if len(keys) == 1 and not str(keys[0]).startswith("schemes."):
+        # keys that vary together count as one
+        axes: dict[Path_, list[str]] = {}
+        for path, _ in swept_values(sweep):
+            axes.setdefault(path[:-1] if path[1] == "zip" else path, []).append(str(path[-1]))
+        keys = [axis[0] for axis in axes.values() if fixed.keys().isdisjoint(axis)]
+        keys = [key for key in keys if "." in key]
+        if len(keys) == 1 and not keys[0].startswith("schemes."):
             result["over"] = keys[0]
     return result
 

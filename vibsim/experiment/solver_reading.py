@@ -6,7 +6,7 @@ import ast
 import math
 import re
 import shlex
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -31,6 +31,7 @@ from vibsim.experiment.schema.solver import (
     SolverConvergesCheck,
     SolverDocument,
 )
+from vibsim.experiment.schema.sweep import swept_values
 from vibsim.experiment.solver import OUTPUTS, SolverExperiment, SolverSpec, placeholders
 from vibsim.experiment.tables.file import ENDINGS
 from vibsim.experiment.validation import read_document
@@ -53,16 +54,18 @@ def read_solver(source: Source, collection: str, file: Path) -> SolverExperiment
     check_names(name, collection, report)
     document = read_document(report, SolverDocument)
     numbers, sizes = _sizes(document.refine, report)
-    sweep, whole = _sweep(document.sweep, report)
     # names from the raw file: placeholders of faulty values are no further fault
-    refined, swept = _keys(source.data.get("refine")), list(_raw_values(source.data.get("sweep")))
+    refine = source.data.get("refine")
+    refined = list(refine) if isinstance(refine, Mapping) else []
+    written = {str(path[-1]): raw for path, raw in swept_values(source.data.get("sweep"))}
     size_names = [name for name in refined if name != "levels"]
-    swept_names = [name for name, _ in swept]
+    swept_names = list(written)
+    sweep, whole = _sweep(document.sweep, written, report)
     _check_names(size_names, swept_names, document.quantities, report)
     level_names = [*size_names, *(["level"] if "levels" in refined else [])]
     solver = _solver(document.solver, level_names, swept_names, report)
     checks = _checks(document, report)
-    numeric = [name for name, values in swept if not _is_text(values)]
+    numeric = [name for name, values in written.items() if not _is_text(values)]
     _check_exact(document.quantities, numeric, report)
     report.raise_any()
     assert solver is not None
@@ -148,30 +151,18 @@ def _by_formula(
 # ---- the sweep
 
 
-def _sweep(section: Any, report: Report) -> tuple[Sweep | None, tuple[str, ...]]:
+def _sweep(
+    section: Any, written: Mapping[str, Any], report: Report
+) -> tuple[Sweep | None, tuple[str, ...]]:
     """Return the sweep (None without one), and the names whose values in the file are all whole numbers."""
     if section is None:
         return None, ()
-    raw = dict(_raw_values(report.source.data["sweep"]))
-    types = {name: Text if _is_text(values) else Number for name, values in raw.items()}
+    types = {name: Text if _is_text(values) else Number for name, values in written.items()}
     axes = [axis for axis in SweepReader(types, report).axes(section) if axis is not None]
-    if not raw:
+    if not written:
         report.add(("sweep",), "must not be empty")
-    return Sweep.model_construct(axes=tuple(axes)), tuple(filter(lambda n: _is_whole(raw[n]), raw))
-
-
-def _keys(section: Any) -> list[str]:
-    return list(section) if isinstance(section, Mapping) else []
-
-
-def _raw_values(section: Any) -> Iterator[tuple[str, Any]]:
-    """Yield the names of a sweep with their raw values in the file."""
-    for key, value in section.items() if isinstance(section, Mapping) else ():
-        inner = value.get("over") if key == "sample" and isinstance(value, Mapping) else value
-        if key in ("zip", "sample"):
-            yield from inner.items() if isinstance(inner, Mapping) else ()
-        else:
-            yield key, value
+    whole = tuple(name for name, values in written.items() if _is_whole(values))
+    return Sweep.model_construct(axes=tuple(axes)), whole
 
 
 def _is_text(raw: Any) -> bool:

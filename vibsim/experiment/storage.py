@@ -73,19 +73,17 @@ def extrema_kept(trajectories: int) -> int:
     return _bounded(MOST_EXTREMA, trajectories)
 
 
-def events_kept(trajectories: int) -> int:
-    """Return the number of event times that a level stores per scheme and member; fewer with many `trajectories`."""
-    return _bounded(MOST_EVENTS, trajectories)
-
-
 def event_times(experiment: ExperimentSpec) -> int:
-    """Return the number of event times that a level stores; if storage is bounded, only as many as checks need."""
+    """Return the number of event times that a level stores per scheme and member.
+
+    It is smaller with many of them; if storage is bounded, only as large as checks need.
+    """
     if experiment.model.definition.events is None:
         return 0
     checks = (check.measured for check in experiment.checks)
     numbers = (check.at.event or 0 for check in checks if check.kind == "value")
-    default = 0 if is_bounded(experiment) else events_kept(experiment.trajectories)
-    return max(default, *numbers, 0)
+    kept = 0 if is_bounded(experiment) else _bounded(MOST_EVENTS, experiment.trajectories)
+    return max(kept, *numbers, 0)
 
 
 def _bounded(count: int, trajectories: int) -> int:

@@ -62,10 +62,7 @@ def diff(options: Namespace) -> int:
 def _side(word: str, results: Path) -> Side:
     """Return the side that a word names: a folder of results, or an experiment with its current results, if any.
 
-    Raises
-    ------
-    FileError
-        Where results are damaged.
+    Raises FileError where results are damaged.
     """
     path = Path(word)
     folder = path.parent if path.name in _RESULTS else path

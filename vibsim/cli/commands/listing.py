@@ -18,10 +18,7 @@ if TYPE_CHECKING:
 def list_(options: Namespace) -> int:
     """Print the names with a description, also those that installed packages offer.
 
-    Raises
-    ------
-    InputError
-        After the list, where the offer of a package cannot be loaded.
+    Raises InputError after the list, where the offer of a package cannot be loaded.
     """
     if options.name is not None:
         if options.what not in ("models", "schemes"):

@@ -34,10 +34,8 @@ DEFAULT_DOTS = 120.0  # per inch
 def movie(options: Namespace) -> int:
     """Write a movie, its frames, or both.
 
-    Raises
-    ------
-    VibsimError
-        Where there are no results, they have no time series, or the encoder of the format is not installed.
+    Raises VibsimError where there are no results, they have no time series, or the encoder of the format is not
+    installed.
     """
     from vibsim.report.movie import drawing, encoding
 

@@ -18,10 +18,7 @@ from vibsim.store import read_json
 def open_(options: Namespace) -> int:
     """Open a page, or print its path where there is no browser.
 
-    Raises
-    ------
-    VibsimError
-        Where the page does not exist yet.
+    Raises VibsimError where the page does not exist yet.
     """
     results = chosen_results(options)
     word = options.experiment

@@ -42,12 +42,8 @@ _TYPES = {
 def publish(options: Namespace) -> int:
     """Copy complete and current results of one experiment to a new folder, with an index and metadata.
 
-    Raises
-    ------
-    InputError
-        Where the folder is not empty.
-    VibsimError
-        Where a file is damaged, missing, or older than a change of the experiment file.
+    Raises InputError where the folder is not empty, and VibsimError where a file is damaged, missing, or older than a
+    change of the experiment file.
     """
     target: Path = options.publish.absolute()
     if target.exists() and not (target.is_dir() and not any(target.iterdir())):

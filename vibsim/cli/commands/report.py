@@ -10,10 +10,7 @@ from vibsim.cli.jobs.common import refusal
 def report(options: Namespace) -> int:
     """Write a report or the index; or publish existing results.
 
-    Raises
-    ------
-    InputError
-        Where the options of both are mixed.
+    Raises InputError where the options of both are mixed.
     """
     if options.publish is None:
         if options.license:

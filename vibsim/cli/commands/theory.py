@@ -31,10 +31,7 @@ _DIGITS, _PRECISE = 8, 40
 def theory(options: Namespace) -> int:
     """Print characteristic polynomial, stability limit, series and solution of a scheme.
 
-    Raises
-    ------
-    InputError
-        Where the scheme or an option is unknown, and for a scheme that chooses its own steps.
+    Raises InputError where the scheme or an option is unknown, and for a scheme that chooses its own steps.
     """
     scheme = scheme_named(options.scheme)
     if scheme.adaptive:

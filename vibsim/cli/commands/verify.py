@@ -43,12 +43,8 @@ _README = "README.md"
 def verify(options: Namespace) -> int:
     """Compare files with their manifest, and recompute the named experiments, except with ``--files``.
 
-    Raises
-    ------
-    InputError
-        Where a name or an experiment file is refused, or a user's program is not allowed.
-    VibsimError
-        Where there are no results.
+    Raises InputError where a name or an experiment file is refused, or a user's program is not allowed, and VibsimError
+    where there are no results.
     """
     results, words = chosen_results(options), options.experiments
     plans: Sequence[Plan] = []

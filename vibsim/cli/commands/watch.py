@@ -23,10 +23,7 @@ _Saved = dict[Path, tuple[int, int, int] | None]
 def watch(options: Namespace) -> int:
     """Run, wait for a change, and run again, until a signal ends it.
 
-    Raises
-    ------
-    InputError
-        Where the experiment file does not exist.
+    Raises InputError where the experiment file does not exist.
     """
     file: Path = options.file
     if file.suffix not in ENDINGS or not file.is_file():

@@ -140,10 +140,7 @@ def open_levels(
 ) -> Iterator[dict[int, Callable[[int, int], Record]]]:
     """Check and open all level files; yield for each level a function that reads members start..stop-1.
 
-    Raises
-    ------
-    VibsimError
-        Where a file is damaged or from another job.
+    Raises VibsimError where a file is damaged or from another job.
     """
     from vibsim import store
 

@@ -75,13 +75,7 @@ def is_made(path: Path, job: ShardJob) -> bool:
 
 
 def _make(plan: Plan, level: int, job: ShardJob, path: Path, threads: int) -> None:
-    """Simulate the members of a file and write it.
-
-    Raises
-    ------
-    VibsimError
-        Where this fails; it names the level and the members.
-    """
+    """Simulate the members of a file and write it; an error names the level and the members."""
     from vibsim import store
     from vibsim.plan.digests import simulated, values_digest
     from vibsim.simulation import simulate_record

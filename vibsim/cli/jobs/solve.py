@@ -16,13 +16,7 @@ FLAG = "--allow-commands"
 
 
 def check_allowed(plans: Iterable[Plan], allowed: bool) -> None:
-    """Refuse commands and functions of experiment files unless the command line allows them.
-
-    Raises
-    ------
-    InputError
-        Lists all of them.
-    """
+    """Refuse all commands and functions of experiment files unless the command line allows them."""
     rule = "a program of the user runs only where it is allowed"
     faults = [
         Fault(plan.file, 0, "solver", plan.command, rule, f"run with {FLAG} if you trust this file")
@@ -34,13 +28,7 @@ def check_allowed(plans: Iterable[Plan], allowed: bool) -> None:
 
 
 def make(plan: Plan, level: int, job: ShardJob, path: Path, threads: int) -> None:
-    """Run the solver for one member at one level and write its result.
-
-    Raises
-    ------
-    VibsimError
-        Where this fails; it names the level and the member.
-    """
+    """Run the solver for one member at one level and write its result; an error names both."""
     from vibsim import store
     from vibsim.experiment.solver import restore
     from vibsim.solver import level_output, run

@@ -45,10 +45,8 @@ class Executor:
 def chosen(options: Namespace, plans: Sequence[Plan], results: Path) -> Executor:
     """Return the executor that the command line requests.
 
-    Raises
-    ------
-    InputError
-        Where the executor or profile does not exist, or this machine has too little memory or disk for local jobs.
+    Raises InputError where the executor or profile does not exist, or this machine has too little memory or disk for
+    local jobs.
     """
     name, profile = options.executor, options.profile
     if not name and not profile:

@@ -23,10 +23,7 @@ JOBS = "jobs of the workflow"
 def check_place(path: Path) -> None:
     """Check before a run that the report can be written to `path`, and remove the report of an earlier run.
 
-    Raises
-    ------
-    InputError
-        Where the folder does not exist, or `path` exists and is not a file.
+    Raises InputError where the folder does not exist, or `path` exists and is not a file.
     """
     rule = "" if path.parent.is_dir() else f"there is no folder {path.parent}"
     if path.exists() and not path.is_file():

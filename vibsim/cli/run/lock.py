@@ -35,17 +35,10 @@ _NO_LOCKS = (errno.ENOLCK, errno.ENOSYS, errno.EOPNOTSUPP)
 
 
 def hold(results: Path) -> int:
-    """Wait until no other run works in `results`, and lock it until this process ends.
+    """Wait until no other run works in `results`, lock it until this process ends, and return the lock's descriptor.
 
-    Returns
-    -------
-    int
-        The descriptor that holds the lock.
-
-    Raises
-    ------
-    VibsimError
-        Where the folder cannot be written, or its file system has no locks, so that runs could not be kept apart.
+    Raises VibsimError where the folder cannot be written, or its file system has no locks, so that runs could not be
+    kept apart.
     """
     try:
         return _hold(results)
@@ -89,13 +82,7 @@ def _identity(descriptor: int) -> str:
 
 
 def claim(plans: Sequence[Plan], results: Path, *, dry_run: bool = False) -> None:
-    """Refuse names that belong to other files, and record the files of these plans, except in a dry run.
-
-    Raises
-    ------
-    InputError
-        Lists both files of every name that is taken.
-    """
+    """Refuse all names that belong to other files, and record the files of these plans, except in a dry run."""
     record = results / ".vibsim/sources.json"
     known = _load(record)
     sources = {plan.key: _source(plan, results) for plan in plans if plan.collection == ADHOC}

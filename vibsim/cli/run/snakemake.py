@@ -167,6 +167,8 @@ def run(
 ) -> Outcome:
     """Run Snakemake on `plans` and return when it has ended.
 
+    Raises Interrupted where SIGHUP, SIGINT or SIGTERM ended Snakemake, and VibsimError where another signal killed it.
+
     Parameters
     ----------
     results, lock_fd
@@ -175,13 +177,6 @@ def run(
         Where jobs run.
     progress
         Display of the progress, if any.
-
-    Raises
-    ------
-    Interrupted
-        Where SIGHUP, SIGINT or SIGTERM ended Snakemake.
-    VibsimError
-        Where another signal killed it.
     """
     results_folder.clean(results, [plan.key for plan in plans])
     config = _write_config(plans, results, target)

@@ -9,10 +9,10 @@ from typing import Any
 
 import numpy as np
 
-from vibsim.experiment.data import StructureSpec, TableSpec
+from vibsim.experiment.data import ModelSpec, StructureSpec, TableSpec
 from vibsim.experiment.faults import Report
 from vibsim.experiment.kinds import COORDINATES
-from vibsim.experiment.rules.formulas import NAME, declared_parameters, is_valid, read_formulas
+from vibsim.experiment.rules.formulas import NAME, FormulaReader
 from vibsim.experiment.rules.potential import NOT_FOUND, check_potential, note_potential
 from vibsim.experiment.rules.structure import read_structure
 from vibsim.experiment.schema.fields import AT, DECLARED, Section
@@ -43,10 +43,24 @@ class Equation:
     """The optional terms (`Model.optional`) that the equation contains."""
     structure: StructureSpec | None = None
 
+    @property
+    def valued(self) -> Model | None:
+        """The model, if all its parameters have values: with a faulty section there may be none at all."""
+        model = self.model
+        return model if model and len(self.parameters) >= len(model.parameters) else None
 
-def has_all_values(model: Model, parameters: Mapping[str, float]) -> bool:
-    """Tell whether every parameter of a model has a value; with a faulty section there may be none at all."""
-    return len(parameters) >= len(model.parameters)
+    def spec(self, parameters: Mapping[str, float]) -> ModelSpec:
+        """Return an equation without fault as a part of an experiment, with these (scaled) parameters."""
+        assert self.model is not None
+        return ModelSpec(
+            kind=self.model.kind,
+            parameters=dict(parameters),
+            formulas=self.formulas,
+            coordinates=self.model.positions if self.model.named is not None else (),
+            tables=self.tables,
+            terms=self.terms,
+            structure=self.structure,
+        )
 
 
 def equation(
@@ -96,12 +110,11 @@ def _equation_of_structure(section: Any, model: Model, folder: Path, report: Rep
     parameters = {
         row.key: float(getattr(section.rayleigh, row.name, row.default)) for row in RAYLEIGH
     }
-    declared = declared_parameters(section, model, report)
+    reader = FormulaReader(section, model, report)
+    declared = reader.declared
     spec, loads = read_structure(section, folder, report)
-    load_field = FormulaField("load", ("t",), "", "load")
-    known = (*(row.name for row in RAYLEIGH), *declared)
     for text, path in loads.values():
-        is_valid(text, load_field, path, known, report)
+        reader.is_valid(text, FormulaField("load", ("t",), "", "load"), path)
     if spec is None or report.has_faulty_model:
         return Equation(None)
     texts = {key: text for key, (text, _) in loads.items()}
@@ -112,9 +125,11 @@ def _equation_of_structure(section: Any, model: Model, folder: Path, report: Rep
 
 def _equation_of_formulas(section: Any, model: Model, folder: Path, report: Report) -> Equation:
     """Return the equation of a model whose formulas are in the section."""
-    declared = declared_parameters(section, model, report)
-    texts, coefficients, tables = read_formulas(section, model, declared, folder, report)
-    parameters = {row.name: getattr(section, row.name) for row in model.parameters} | coefficients
+    reader = FormulaReader(section, model, report)
+    reader.read(folder)
+    declared, texts, tables = reader.declared, reader.texts, reader.tables
+    parameters = {row.name: getattr(section, row.name) for row in model.parameters}
+    parameters |= reader.coefficients
     exact = next((name for name in texts if name.startswith("exact")), "")
     _check_combinations(section, texts, exact, f"damping.{COULOMB}" in parameters, report)
     if report.has_faulty_model:

@@ -10,7 +10,6 @@ from vibsim.core.errors import listed, nearest
 from vibsim.experiment.data import TimeSpec
 from vibsim.experiment.faults import MISSING, Report
 from vibsim.experiment.rules.members import SLACK
-from vibsim.experiment.rules.model import has_all_values
 from vibsim.experiment.schema.document import LevelRange, TimeSection
 from vibsim.experiment.yaml.parse import Path_
 from vibsim.models import Model, natural_end, table_end
@@ -27,7 +26,10 @@ def time_spec(
     parameters: Mapping[str, float],
     report: Report,
 ) -> TimeSpec | None:
-    """Return the end and the steps at level 0; None if they cannot be determined."""
+    """Return the end and the steps at level 0; None if they cannot be determined.
+
+    `model` is None unless all its `parameters` have values.
+    """
     if section is None:
         return None
     keys = {name for name in TimeSection.model_fields if getattr(section, name) is not None}
@@ -67,7 +69,7 @@ def time_spec(
     if steps is None:
         rule = "periods*steps_per_period must be a whole number"
         report.add(("time", "steps_per_period"), rule, f"it is {product:.15g}")
-    if steps is None or model is None or not has_all_values(model, parameters):
+    if steps is None or model is None:
         return None
     if section.frequency is not None:
         return _by_force(section, steps, model, parameters, report)
@@ -119,7 +121,7 @@ def _by_table(
     steps: int, model: Model | None, parameters: Mapping[str, float], report: Report
 ) -> TimeSpec | None:
     """Return the time from abscissa 0 to the end of the table, with `steps` steps per spacing."""
-    if model is None or not has_all_values(model, parameters):
+    if model is None:
         return None
     if model.lookup is None:
         rule = "needs a model with a table, such as a vehicle whose road is one"

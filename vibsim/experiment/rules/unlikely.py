@@ -14,9 +14,9 @@ from vibsim.core.vocabulary import VECTORS, VELOCITY_VECTOR
 from vibsim.experiment.faults import Report
 from vibsim.experiment.rules.formulas import NAME
 from vibsim.experiment.rules.members import MemberNumbers
-from vibsim.experiment.rules.size_limits import Setting
 from vibsim.experiment.schema.checks import AccurateCheck, Check, ConvergesCheck, ValueCheck
 from vibsim.experiment.schema.fields import DECLARED
+from vibsim.experiment.schema.sweep import swept_values
 from vibsim.experiment.schema.unit_text import split
 from vibsim.experiment.value_names import OF_THE_SAME_KIND, VALUES
 from vibsim.experiment.yaml.parse import Path_
@@ -44,22 +44,21 @@ EXACT_DIGITS = 9
 
 
 def note_unlikely(
-    checks: Sequence[Check | None], setting: Setting, members: MemberNumbers, report: Report
+    checks: Sequence[Check], levels: Sequence[int], members: MemberNumbers, report: Report
 ) -> None:
-    """Warn about probable mistakes; `checks` are those of the file, None for a malformed one."""
-    _warn_angles(setting, report)
-    _warn_phases(setting, report)
-    _warn_hertz(setting, report)
+    """Warn about probable mistakes in a file without fault; `checks` are those that it gives."""
+    model = members.model
+    _warn_angles(model, report)
+    _warn_phases(model, report)
+    _warn_hertz(model, report)
     _warn_signs(members, report)
     _warn_repeated(report)
     _warn_set_and_swept(report)
     for i, check in enumerate(checks):
-        if check is None:
-            continue
         inner = check.measured
         path: Path_ = ("checks", i) if inner is check else ("checks", i, "that")
-        if inner.about in VECTORS and setting.model is not None:
-            _warn_mixed(path, inner.about, setting.model, report)
+        if inner.about in VECTORS:
+            _warn_mixed(path, inner.about, model, report)
         match inner:
             case AccurateCheck(relative=float(bound)) if bound >= 1.0:
                 rule = f"is {bound:g} times the size of {inner.accurate}, and nearly every error is below that"
@@ -67,10 +66,8 @@ def note_unlikely(
             case ConvergesCheck(order=float(order)) if inner.tolerance >= order:
                 rule = f"lets every order up to {order + inner.tolerance:g} pass"
                 report.note((*path, "tolerance"), rule, "it is a distance of orders, such as 0.1")
-            case ConvergesCheck() if (
-                len(setting.levels) in (1, 2) and inner.expect.status == "PASS"
-            ):
-                rule = f"{len(setting.levels)} of them decide no order"
+            case ConvergesCheck() if len(levels) in (1, 2) and inner.expect.status == "PASS":
+                rule = f"{len(levels)} of them decide no order"
                 report.note(("levels",), rule, "three are needed, and four are better")
             case ValueCheck(rtol=float(part)) if part >= 1.0:
                 rule = f"lets every number up to {1.0 + part:g} times the expected one pass"
@@ -81,18 +78,14 @@ def note_unlikely(
                 _warn_digits((*path, "equals"), inner.value, number, report)
 
 
-def _warn_angles(setting: Setting, report: Report) -> None:
+def _warn_angles(model: Model, report: Report) -> None:
     """Warn about angles of more than a turn without a unit: they are in rad, and degrees may be meant."""
-    model = setting.model
-    if model is None:
-        return
     of_equation = set(angles(model)) if model.dimensionless else set()
     for state in model.states:
         if state.unit != "rad" and state.name not in of_equation:
             continue
         for path, values in _unitless_starts(report.source.data, state.name):
-            largest = max(map(abs, values), default=0.0)
-            _note_angle(path, largest, report)
+            _note_angle(path, max(map(abs, values), default=0.0), report)
 
 
 def _warn_mixed(path: Path_, vector: str, model: Model, report: Report) -> None:
@@ -105,16 +98,14 @@ def _warn_mixed(path: Path_, vector: str, model: Model, report: Report) -> None:
         report.note(path, rule, "a sum means something only in one unit")
 
 
-def _warn_phases(setting: Setting, report: Report) -> None:
+def _warn_phases(model: Model, report: Report) -> None:
     """Warn about phases of more than a turn without a unit: as 90 in ``cos(w*t + 90)``."""
-    model, declared = setting.model, _at_path(report.source.data, ("model", DECLARED))
-    phases = {*_terms_of_waves(model)} if model else set()
-    for name, value in declared.items() if isinstance(declared, Mapping) else ():
+    phases = {*_terms_of_waves(model)}
+    for name, value in report.source.data["model"].get(DECLARED, {}).items():
         if Name(name) in phases and type(value) in (int, float):
             _note_angle(("model", DECLARED, name), abs(value), report)
-    _note_angle(
-        ("model",), max((abs(literal(term) or 0.0) for term in phases), default=0.0), report
-    )
+    written = max((abs(literal(term) or 0.0) for term in phases), default=0.0)
+    _note_angle(("model",), written, report)
 
 
 def _note_angle(path: Path_, angle: float, report: Report) -> None:
@@ -125,11 +116,9 @@ def _note_angle(path: Path_, angle: float, report: Report) -> None:
         report.note(path, rule, f"{angle:g} degrees are written {written}")
 
 
-def _warn_hertz(setting: Setting, report: Report) -> None:
+def _warn_hertz(model: Model, report: Report) -> None:
     """Warn about a declared frequency in hertz that is taken for an angular one: as `w` in ``cos(w*t)``."""
-    model, declared = setting.model, _at_path(report.source.data, ("model", DECLARED))
-    if model is None or not isinstance(declared, Mapping):
-        return
+    declared = report.source.data["model"].get(DECLARED, {})
     for name in sorted(_rates(model) & set(declared)):
         text = declared[name]
         halves = split(text) if isinstance(text, str) else None
@@ -167,7 +156,7 @@ def _warn_signs(members: MemberNumbers, report: Report) -> None:
     if members.model.kind != "oscillator":
         return
     for name, state in (("damping", "v"), ("spring", "u")):
-        text = _at_path(report.source.data, ("model", name))
+        text = report.source.data["model"].get(name)
         names = {*(NAME.findall(text) if isinstance(text, str) else ())} - {*CONSTANTS}
         if state not in names:
             continue
@@ -197,10 +186,7 @@ def _warn_repeated(report: Report) -> None:
 
 def _warn_set_and_swept(report: Report) -> None:
     """Warn about a value of the command line without effect, because the file sweeps its key."""
-    keys: set[str] = set()
-    for path in ((), ("zip",), ("sample", "over")):
-        section = _at_path(report.source.data, ("sweep", *path))
-        keys |= set(section) if isinstance(section, Mapping) else set()
+    keys = {path[-1] for path, _ in swept_values(report.source.data.get("sweep"))}
     for text in report.source.settings:
         key = text.partition("=")[0].strip()
         if key in keys:
@@ -208,22 +194,11 @@ def _warn_set_and_swept(report: Report) -> None:
             report.note(tuple(key.split(".")), "has no effect, because it is swept", hint)
 
 
-def _at_path(content: Any, path: Path_) -> Any:
-    """Return the value at `path` in the content of a file; None if there is none."""
-    for key in path:
-        content = content.get(key) if isinstance(content, Mapping) else None
-    return content
-
-
 def _unitless_starts(data: Mapping[str, Any], name: str) -> Iterator[tuple[Path_, list[float]]]:
     """Yield the paths of an initial value, in its section and in the sweep, with the unitless numbers there."""
-    for path in (
-        ("initial", name),
-        ("sweep", f"initial.{name}"),
-        ("sweep", "zip", f"initial.{name}"),
-        ("sweep", "sample", "over", f"initial.{name}"),
-    ):
-        value = _at_path(data, path)
+    start: tuple[Path_, Any] = ("initial", name), (data.get("initial") or {}).get(name)
+    swept = (row for row in swept_values(data.get("sweep")) if row[0][-1] == f"initial.{name}")
+    for path, value in (start, *swept):
         if isinstance(value, Mapping):
             # the first two numbers of a rule are values
             value = [x for rule in value.values() if isinstance(rule, list) for x in rule[:2]]
@@ -234,8 +209,8 @@ def _unitless_starts(data: Mapping[str, Any], name: str) -> Iterator[tuple[Path_
 
 def _warn_digits(path: Path_, name: str, number: float, report: Report) -> None:
     """Warn about an expected number of few digits without a tolerance."""
-    row, place = VALUES.get(name), report.source.place(path)
-    if row is None or row.measure == "count" or number == 0.0:
+    place = report.source.place(path)
+    if VALUES[name].measure == "count" or number == 0.0:
         return
     text = place.text if place and place.text else repr(number)
     try:

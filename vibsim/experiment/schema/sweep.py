@@ -7,7 +7,7 @@ An axis is a single key, several keys that vary together (``zip``), or sample po
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
@@ -24,6 +24,7 @@ from vibsim.experiment.schema.fields import (
     refused,
     whole,
 )
+from vibsim.experiment.yaml.parse import Path_
 from vibsim.schemes import SCHEMES, NumberOption, Option, Scheme
 from vibsim.schemes.base import EVENTS
 
@@ -224,6 +225,17 @@ class ParameterSweep(Section):
     def single(self) -> Mapping[str, Written]:
         """Values of the parameters that form an axis each."""
         return self.__pydantic_extra__ or {}
+
+
+def swept_values(section: Any) -> Iterator[tuple[Path_, Any]]:
+    """Yield the path of each key that a section ``sweep`` varies, and what is written there, valid or not."""
+    for key, value in section.items() if isinstance(section, Mapping) else ():
+        path = {"zip": ("zip",), "sample": ("sample", "over")}.get(key, ())
+        inner = value.get("over") if key == "sample" and isinstance(value, Mapping) else value
+        rows = inner if isinstance(inner, Mapping) else {}
+        yield from (
+            (("sweep", *path, name), x) for name, x in (rows if path else {key: value}).items()
+        )
 
 
 def _key(value: Any) -> Any:
