@@ -57,7 +57,10 @@ def test_every_assessment_has_a_verdict(
     for i, more in enumerate(asked):
         values = kinds[(first + i) % 4]
         verdict = judge(H, values, **more)
-        assert (verdict.status, verdict.reason) == (REASONS[reason], reason)
+        # levels that differ by less than the stated noise show noise
+        is_hidden = reason == "pre_asymptotic" and values is constant and "noise" in more
+        stated = "round_off" if is_hidden else reason
+        assert (verdict.status, verdict.reason) == (REASONS[stated], stated)
         assert verdict.sentence.endswith(".")
         assert bool(verdict.advice) == (verdict.status != "PASS")
         json.dumps(verdict.to_dict(), allow_nan=False)

@@ -46,8 +46,8 @@ def test_finer_levels_are_not_advised_where_they_would_show_noise() -> None:
     values = [1 + h**2 for h in H]
     assert "finer level" in judge(H, [1 + 20 * h**2 + h for h in H], order=2).advice
     verdict = judge(H, values, order=2, noise=1e-3)
-    assert (verdict.status, verdict.reason) == ("INCONCLUSIVE", "pre_asymptotic")
-    assert "differ by little more than the stated noise" in verdict.sentence
+    assert (verdict.status, verdict.reason) == ("INCONCLUSIVE", "round_off")
+    assert "The finest differences of u look like the stated noise" in verdict.sentence
     assert verdict.advice == "Use coarser levels, or compute u with less noise."
 
 
@@ -58,8 +58,21 @@ def test_finer_levels_are_not_advised_where_they_would_show_round_off() -> None:
         *(0.4508530603792373, 0.4508530603792806, 0.4508530603792843),
     ]
     verdict = judge([0.02 * 2.0**-k for k in range(6)], values)
-    assert verdict.reason == "pre_asymptotic"
-    assert "differ by little more than round-off" in verdict.sentence
+    assert verdict.reason == "round_off"
+    assert "The finest differences of u look like round-off" in verdict.sentence
+    assert verdict.advice == "Use coarser levels, or compute u with less noise."
+
+
+@pytest.mark.parametrize("scattered", [8.0, 250.0])
+@pytest.mark.parametrize("away", [0.0, 250.0])
+def test_levels_that_differ_by_added_up_rounding_show_round_off(
+    away: float, scattered: float
+) -> None:
+    """All levels are about `away` units of the last digit from the exact value, and `scattered` from each other."""
+    units = away + scattered * np.array([0.6, 1.7, 0.1, 0.6, 0.9])
+    levels = (math.e * (1.0 + 2.0**-52 * units)).tolist()
+    verdict = judge([0.1 * 0.5**k for k in range(5)], levels, order=2, exact=math.e)
+    assert (verdict.status, verdict.reason) == ("INCONCLUSIVE", "round_off")
     assert verdict.advice == "Use coarser levels, or compute u with less noise."
 
 

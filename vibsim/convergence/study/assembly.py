@@ -13,9 +13,9 @@ from vibsim.convergence.study.common_points import CommonValues
 from vibsim.convergence.study.measurement import rounding_of_sizes
 from vibsim.convergence.study.outcomes import LEAST_RATIO, Outcome, Request
 from vibsim.convergence.study.refinement import Refinement
-from vibsim.convergence.study.sentences import Setting, describe
+from vibsim.convergence.study.sentences import BEYOND_ROUND_OFF, Setting, describe
 from vibsim.convergence.study.verdict import LadderVerdict, Level
-from vibsim.convergence.thresholds import ABOVE_ROUND_OFF
+from vibsim.convergence.thresholds import ABOVE_ROUND_OFF, FLOOR_DECLINE
 from vibsim.core.array_types import Floats
 from vibsim.core.vocabulary import LEVELS_OF_AN_ORDER, ORDER_TOLERANCE, REASONS
 from vibsim.elementary import on_arrays
@@ -39,7 +39,10 @@ def verdict(
     """
     h, (values, dims) = steps.h, compared
     hidden = _hidden(request, common, outcome)
+    is_noise_seen = _is_noise_seen(request, outcome)
     reason = "not_applicable" if hidden else outcome.reason
+    if reason == "pre_asymptotic" and is_noise_seen:
+        reason = "round_off"
     best = _or_none(float(outcome.best[0])) if outcome.best is not None and not dims else None
     size = outcome.size if outcome.size > 0.0 else np.nan
     facts = LadderVerdict(
@@ -70,7 +73,7 @@ def verdict(
     )
     setting = Setting(
         is_noise_stated=bool(request.noise),
-        is_noise_seen=_is_noise_seen(request, outcome),
+        is_noise_seen=is_noise_seen,
         are_digits_few=not request.noise
         and outcome.half > 0.0
         and not _finest(outcome) > ABOVE_ROUND_OFF * outcome.half,
@@ -93,10 +96,18 @@ def _finest(outcome: Outcome) -> float:
 
 
 def _is_noise_seen(request: Request, outcome: Outcome) -> bool:
-    """Say whether the finest difference may be noise, stated or of rounding, so that a finer level would not help."""
+    """Say whether the finest difference may be noise, stated or of rounding, so that a finer level would not help.
+
+    Rounding makes differences near the precision of the values, or, added up, tiny ones that do not fall.
+    """
+    finest = _finest(outcome)
     if request.noise:
-        return not _finest(outcome) > NOISE_SEEN * request.noise
-    return _finest(outcome) <= ABOVE_ROUND_OFF * outcome.floor
+        return not finest > NOISE_SEEN * request.noise
+    previous = float(np.abs(outcome.differences[-2:][0])) if len(outcome.differences) else np.nan
+    is_tiny = finest <= BEYOND_ROUND_OFF * outcome.size
+    return finest <= ABOVE_ROUND_OFF * outcome.floor or (
+        is_tiny and finest > FLOOR_DECLINE * previous
+    )
 
 
 def _order_shift(outcome: Outcome, h: Floats) -> float:

@@ -88,11 +88,6 @@ SENTENCES: Mapping[str, tuple[str, str]] = MappingProxyType(
             "The levels of {quantity} do not show a settled order yet{estimate}.",
             "{finer}.",
         ),
-        "noisy": (
-            "The finest levels of {quantity} differ by little more than {noise}, so they do not show a settled order"
-            "{estimate}.",
-            "{finer}.",
-        ),
         "rounded": (
             "The levels of {quantity} do not show a settled order yet{estimate}. The rounding of the values to their "
             "last digit may hide it.",
@@ -109,7 +104,7 @@ SENTENCES: Mapping[str, tuple[str, str]] = MappingProxyType(
             "{finer}.",
         ),
         "round_off": (
-            "The differences of {quantity} look like {floor}, so they do not show its order{estimate}.",
+            "The finest differences of {quantity} look like {floor}, so they do not show its order{estimate}.",
             "Use coarser levels, or {less_noise}.",
         ),
         "oscillating": (
@@ -128,16 +123,14 @@ SENTENCES: Mapping[str, tuple[str, str]] = MappingProxyType(
     }
 )
 """Templates of sentence and advice by the reasons that levels alone show. ``interpolation`` is the only case of
-``not_applicable``; ``noisy``, ``rounded`` and ``contradicted`` are cases of ``pre_asymptotic``, and ``growing`` is one
-of this and of ``round_off``."""
+``not_applicable``; ``rounded`` and ``contradicted`` are cases of ``pre_asymptotic``, and ``growing`` is one of this and
+of ``round_off``."""
 
 
 def describe(facts: LadderVerdict, setting: Setting) -> tuple[str, str]:
     """Return sentence and advice on a ladder; the advice is empty if it passed."""
     key = "interpolation" if setting.interpolation else facts.reason
-    if key == "pre_asymptotic" and setting.is_noise_seen:
-        key = "noisy"
-    elif key == "pre_asymptotic" and setting.is_contradicted and facts.order is not None:
+    if key == "pre_asymptotic" and setting.is_contradicted and facts.order is not None:
         key = "contradicted"
     elif facts.order is not None and round(facts.order, 3) < 0.0 and _is_growth(facts, setting):
         key = "growing"
