@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import itertools
+from collections.abc import Sequence
+
 import numpy as np
 
 from vibsim.comparison import value_numbers
@@ -140,19 +143,24 @@ def _between_points(name: str, series: Series, over_points: Floats) -> tuple[Flo
 
 def _rise_between_points(series: Series, place: value_numbers.Place, order: Floats) -> Floats:
     """Return by how much another extremum may exceed that of the finest level in the limit, (scheme, case)."""
-    finest = len(place.levels) - 1
-    if not {finest - 1, finest} <= set(series):
+    count = len(place.levels)
+    finest = [i for i in range(count - LEVELS_OF_AN_ORDER, count) if i in series]
+    if not {count - 2, count - 1} <= set(finest):
         return np.zeros(order.shape)
-    known = (np.nan_to_num(series[i], posinf=0.0, neginf=0.0) for i in (finest - 1, finest))
-    coarse, fine = (crest_heights(values) for values in known)
-    return _rise(coarse, fine, place, order)
+    known = (np.nan_to_num(series[i], posinf=0.0, neginf=0.0) for i in finest)
+    return _rise([crest_heights(values) for values in known], place, order)
 
 
-def _rise(coarse: Heights, fine: Heights, place: value_numbers.Place, order: Floats) -> Floats:
-    """Return the rise of other extrema from the heights of all at the two finest levels."""
-    gap = place.levels[-1] - place.levels[-2]
-    fall = np.where(np.isfinite(order), -1.0 - error_factor(np.maximum(order, 1.0), gap), 0.0)
-    return rise_of_other_crests(coarse, fine, fall.reshape(-1)).reshape(order.shape)
+def _rise(heights: Sequence[Heights], place: value_numbers.Place, order: Floats) -> Floats:
+    """Return the rise of other extrema from the heights of all at the finest levels, two or three."""
+    finest = place.levels[-len(heights) :]
+    falls = [
+        np.where(
+            np.isfinite(order), -1.0 - error_factor(np.maximum(order, 1.0), fine - coarse), 0.0
+        )
+        for coarse, fine in itertools.pairwise(finest)
+    ]
+    return rise_of_other_crests(heights, [fall.reshape(-1) for fall in falls]).reshape(order.shape)
 
 
 def _at_events(
@@ -184,7 +192,7 @@ def _at_events(
         values[..., i] = upward(top) if name == "min" else top
         times, turns = np.append(times, rest_time, axis=-1), np.append(turns, rest, axis=-1)
         heights.append(_sorted(times / block.group.end[:, None], turns))
-    return values, _rise(heights[-2], heights[-1], place, order), is_event
+    return values, _rise(heights[-LEVELS_OF_AN_ORDER:], place, order), is_event
 
 
 def _turns(name: str, record: Record) -> tuple[Floats, Floats]:

@@ -14,8 +14,6 @@ from vibsim.core.array_types import Flags, Floats, Integers
 
 WIDTH, NARROW = 7, 5
 """Points of the polynomial, and of a narrower one: their distance is the error bound."""
-ALIKE = 0.1
-"""Crests count as equal if their extrapolated values differ by less than this part of the extrapolation. [chosen]"""
 SMOOTH = 0.25
 """A function has no corner if its fifth differences are below this part of the third ones: w dt = 1/2. [derived]"""
 _SIDE = WIDTH // 2
@@ -71,39 +69,58 @@ class Heights(NamedTuple):
     values: Floats
 
 
-def rise_of_other_crests(coarse: Heights, fine: Heights, fall: Floats) -> Floats:
-    """Return by how much another crest may exceed, in the limit, the crest that is the highest on the fine grid.
+def rise_of_other_crests(grids: Sequence[Heights], falls: Sequence[Floats]) -> Floats:
+    """Return by how much another crest may exceed, in the limit, the crest that is the highest on the finest grid.
 
-    The values of all crests are extrapolated from the coarse and the fine grid. Crests that change alike are harmless.
+    The lead of each crest over the highest is extrapolated from the two finest grids. Its uncertainty is what it would
+    change by if extrapolated again from the lead that the two grids before tell. Without a third grid, it is what the
+    crest has still to change.
 
     Parameters
     ----------
-    coarse, fine
-        Crests of m functions on either grid.
-    fall
-        Remaining change to the limit, over the change from the coarse to the fine grid, shape (m,).
+    grids
+        Crests of m functions on two or three grids, the finest last.
+    falls
+        Remaining change to the limit, over the change from a grid to the next, shape (m,).
 
     Returns
     -------
     array
         Shape (m,); 0 if no other crest can be the highest.
     """
-    (coarse_keys, before), (fine_keys, now) = coarse, fine
-    if not (len(coarse_keys) and len(fine_keys)):
-        return np.zeros(len(fall))
-    partner, partner_of_partner = _nearest(coarse_keys, fine_keys), _nearest(fine_keys, coarse_keys)
-    is_mutual = partner_of_partner[partner] == np.arange(len(partner))
-    row = fine_keys.astype(np.int64) // 2
-    rest = np.where(is_mutual, fall[row] * (now - before[partner]), 0.0)
-    highest = np.full(len(fall), -np.inf)
-    np.maximum.at(highest, row, now)
-    limit_of_highest = np.full(len(fall), -np.inf)
-    is_highest = now == highest[row]
-    np.maximum.at(limit_of_highest, row[is_highest], (now + rest)[is_highest])
-    above = now + rest - limit_of_highest[row]
-    rise = np.zeros(len(fall))
-    np.maximum.at(rise, row, np.where(above > ALIKE * np.abs(rest), above + np.abs(rest), 0.0))
+    count, fine = len(falls[-1]), grids[-1]
+    if not all(len(crests.keys) for crests in grids):
+        return np.zeros(count)
+    row = fine.keys.astype(np.int64) // 2
+    highest = np.full(count, -np.inf)
+    np.maximum.at(highest, row, fine.values)
+    is_highest = fine.values == highest[row]
+    partner, is_same, limit = _extrapolated(grids[-2], fine, falls[-1])
+    lead = _lead(limit, row, is_highest, count)
+    unsure = np.abs(limit - fine.values)
+    if len(grids) > 2:
+        *_, before = _extrapolated(grids[-3], grids[-2], falls[-2])
+        change = lead - _lead(before[partner], row, is_highest, count)
+        unsure = np.where(is_same, falls[-1][row] * np.abs(change), 0.0)
+    rise = np.zeros(count)
+    np.maximum.at(rise, row, np.where(is_highest, 0.0, lead + unsure))
     return rise
+
+
+def _extrapolated(coarse: Heights, fine: Heights, fall: Floats) -> tuple[Integers, Flags, Floats]:
+    """Return for each fine crest the nearest coarse one, whether they are the same, and the height in the limit."""
+    partner, back = _nearest(coarse.keys, fine.keys), _nearest(fine.keys, coarse.keys)
+    is_same = back[partner] == np.arange(len(partner))
+    row = fine.keys.astype(np.int64) // 2
+    rest = np.where(is_same, fall[row] * (fine.values - coarse.values[partner]), 0.0)
+    return partner, is_same, fine.values + rest
+
+
+def _lead(limit: Floats, row: Integers, is_highest: Flags, count: int) -> Floats:
+    """Return how far each crest is above the highest one of its function."""
+    of_highest = np.full(count, -np.inf)
+    np.maximum.at(of_highest, row[is_highest], limit[is_highest])
+    return np.asarray(limit - of_highest[row])
 
 
 def crest_heights(series: Floats) -> Heights:
