@@ -175,9 +175,6 @@ class Report:
         # pydantic inserts the tags of unions, which are not in the file
         keys = (part for part in row["loc"] if not str(part).startswith("\0"))
         path: Path_ = (*above, *keys)
-        if kind.startswith("union_tag"):
-            self._add_kind(path, row["input"])
-            return path
         context = row.get("ctx", {})
         message = row["msg"].replace("Input should", "must", 1)
         rule = _RULES.get(kind, "{msg}").format(**{**context, "msg": message})
@@ -208,12 +205,12 @@ class Report:
             self.add(path, rule, hint, value)
         return path
 
-    def _add_kind(self, path: Path_, value: object) -> None:
-        """Record that the kind of a model or a scheme is missing or unknown."""
+    def add_kind(self, path: Path_, value: object) -> None:
+        """Record that the kind of a model or a scheme is missing or unknown (`faulty`)."""
         kinds = sorted(self.kinds.names(path[0]))
         if not isinstance(value, dict):
             hint = f"write {{kind: {value}}}" if value in kinds else f"e.g. {{kind: {kinds[0]}}}"
-            self.add(path, "must be a mapping with the key kind", hint, value)
+            self.add_malformed(path, "must be a mapping with the key kind", hint, value)
             return
         rule = f"unknown {path[0]}".rstrip("s") if "kind" in value else MISSING
         kind = value.get("kind")
@@ -221,6 +218,7 @@ class Report:
         if path == ("model",) and (experiment := _shipped(str(kind))):
             hint = f"`vibsim new FILE --like {experiment}` begins with a shipped experiment of this name"
         self.add((*path, "kind"), rule, hint, kind)
+        self.faulty.add(path)
 
     @property
     def _declared(self) -> list[str]:

@@ -14,7 +14,7 @@ from typing import Annotated, Any, Union, get_args, get_origin
 from pydantic import Discriminator, Tag, TypeAdapter, ValidationError
 
 from vibsim.experiment.faults import MISSING, Report
-from vibsim.experiment.schema.document import Document, OneOf
+from vibsim.experiment.schema.document import OF_KIND, Document, section_of_kind
 from vibsim.experiment.schema.fields import STAND_IN, Section
 from vibsim.experiment.units import Units
 from vibsim.experiment.yaml.parse import Path_
@@ -90,8 +90,13 @@ class _Reader:
         if path in self.report.faulty:
             return _FAULTY
         expected = expected.member_for(raw)
-        if expected.one_of and (section := expected.one_of.section_of(raw, self.report.kinds)):
-            expected = _expected_of(section)
+        if expected.is_of_kind:
+            if path[0] == "schemes" and isinstance(raw, str):
+                return raw
+            if section := section_of_kind(path[0], raw, self.report.kinds):
+                return self.section(path, raw, section)
+            self.report.add_kind(path, raw)
+            return _FAULTY
         if expected.section is not None and isinstance(raw, Mapping):
             return self.section(path, raw, expected.section)
         if expected.entries is None or (raw is None and expected.is_optional):
@@ -157,7 +162,7 @@ class _Expected:
         self.section: Any = bare if _is_section(bare) else None
         """The `Section` class, if the value is a mapping described by one."""
         discriminator: Any = next((m for m in metadata if isinstance(m, Discriminator)), None)
-        self.one_of = next((m for m in metadata if isinstance(m, OneOf)), None)
+        self.is_of_kind = any(m is OF_KIND for m in metadata)
         self.tag_for = discriminator.discriminator if discriminator else None
         members = arguments if discriminator else ()
         tagged = ((member, tag) for member in members for tag in member.__metadata__)
@@ -183,7 +188,6 @@ class _Expected:
         return member.member_for(raw) if member else self
 
 
-_expected_of = cache(_Expected)
 _adapter_of = cache(TypeAdapter)
 
 
@@ -202,4 +206,5 @@ def _is_section(kind: Any) -> bool:
 
 
 def _names_section(annotation: Any) -> bool:
-    return _is_section(annotation) or any(map(_names_section, get_args(annotation)))
+    is_one = annotation is OF_KIND or _is_section(annotation)
+    return is_one or any(map(_names_section, get_args(annotation)))

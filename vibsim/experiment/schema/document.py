@@ -7,12 +7,13 @@ import inspect
 import sys
 from collections import ChainMap
 from collections.abc import Iterable, Mapping
-from functools import cache
+from functools import cache, reduce
 from itertools import pairwise
+from operator import or_
 from types import MappingProxyType
 from typing import Annotated, Any, Literal
 
-from pydantic import ConfigDict, Discriminator, Field, StrictBool, WithJsonSchema, create_model
+from pydantic import ConfigDict, Field, StrictBool, WithJsonSchema, create_model
 from pydantic.json_schema import GenerateJsonSchema
 
 from vibsim.experiment.kinds import Kinds
@@ -32,8 +33,6 @@ from vibsim.experiment.schema.fields import (
     Text,
     by_form,
     short,
-    tag,
-    tagged,
 )
 from vibsim.experiment.schema.figures import FigureOfSource
 from vibsim.experiment.schema.model_and_schemes import Event, model_section, scheme_section
@@ -43,48 +42,18 @@ from vibsim.models import MODELS, Model
 from vibsim.models.shared.crossings import MOST_EVENTS
 from vibsim.schemes import SCHEMES, Scheme
 
-
-def _kind(value: Any) -> str | None:
-    if isinstance(value, str):
-        return tag("name")
-    kind = value.get("kind") if isinstance(value, Mapping) else getattr(value, "kind", None)
-    return tag(kind) if isinstance(kind, str) else None
+OF_KIND = object()
+"""Marks a value whose section depends on its key ``kind``: the model, or an entry of ``schemes``."""
 
 
-class OneOf:
-    """Marks the union of the sections of all built-in models or schemes; sections of other kinds are made on demand."""
-
-    def __init__(self, section: Literal["model", "schemes"]) -> None:
-        self.section = section
-
-    def section_of(self, raw: Any, kinds: Kinds) -> type[Section] | None:
-        """Return the section class for the kind in `raw`; None if there is no such kind."""
-        kind = raw.get("kind") if isinstance(raw, Mapping) else None
-        if self.section == "model":
-            model = kinds.model(kind)
-            return None if model is None else model_section(model)
-        scheme = kinds.scheme(kind)
-        return None if scheme is None else scheme_section(scheme)
-
-
-def _any_model(models: Mapping[str, Model]) -> Any:
-    sections = {kind: model_section(model) for kind, model in models.items()}
-    return Annotated[tagged(sections, Discriminator(_kind)), OneOf("model")]
-
-
-def _any_scheme(schemes: Mapping[str, Scheme]) -> Any:
-    about = "A scheme with its defaults."
-    name = Annotated[str, Field(json_schema_extra={"enum": sorted(schemes)}, description=about)]
-    sections = {kind: scheme_section(scheme) for kind, scheme in schemes.items()}
-    return Annotated[tagged({"name": name, **sections}, Discriminator(_kind)), OneOf("schemes")]
-
-
-def _schemes(any_scheme: Any) -> Any:
-    return Annotated[tuple[any_scheme, ...], Field(min_length=1), short(MAX_ENTRIES)]
-
-
-AnyModel: Any = _any_model(MODELS.built_in)
-Schemes: Any = _schemes(_any_scheme(SCHEMES.built_in))
+def section_of_kind(section: str | int, raw: Any, kinds: Kinds) -> type[Section] | None:
+    """Return the class of a model (if `section` is so called) or a scheme; None if it names no known kind."""
+    kind = raw.get("kind") if isinstance(raw, Mapping) else None
+    if section == "model":
+        model = kinds.model(kind)
+        return None if model is None else model_section(model)
+    scheme = kinds.scheme(kind)
+    return None if scheme is None else scheme_section(scheme)
 
 
 def _without(*keys: str) -> dict[str, Any]:
@@ -188,10 +157,6 @@ UNITS_SCHEMA = {
 class Document(Section):
     """An experiment of vibsim: a simulation, and the claims about its outcome."""
 
-    model_config = ConfigDict(
-        json_schema_extra={"oneOf": [{"required": ["levels"]}, {"required": ["tolerance"]}]}
-        | _states_are_known(MODELS.built_in.values())
-    )
     stand_ins = MappingProxyType({"title": None, "model": None, "time": None, "schemes": ()})
 
     title: Text
@@ -200,15 +165,13 @@ class Document(Section):
     """The source of the experiment."""
     units: Annotated[dict[str, str], WithJsonSchema(UNITS_SCHEMA)] = Field({})
     """Additional units, such as ``rod: 4.9 m``, for all numbers that take units."""
-    model: AnyModel
+    model: Annotated[Any, OF_KIND]
     """The equation of motion and its parameters."""
     stop: FormulaText | None = None
     """A comparison that ends the motion, the same as under `model`."""
     events: Annotated[tuple[Event, ...], short(MOST_EVENTS)] = ()
     """Events, the same as under `model`."""
-    initial: Annotated[
-        dict[str, Number], WithJsonSchema(_initial_schema(MODELS.built_in.values()))
-    ] = Field({})
+    initial: dict[str, Number] = Field({})
     """Initial values of the states; 0 for those left out."""
     time: TimeSection
     """The time interval and the number of steps."""
@@ -218,7 +181,7 @@ class Document(Section):
     """Error bound that the extrapolated solution must reach; vibsim then chooses the levels."""
     scaled: StrictBool = False
     """Whether to run in the characteristic units of the model, if it has a scaled equation."""
-    schemes: Schemes
+    schemes: Annotated[tuple[Annotated[Any, OF_KIND], ...], Field(min_length=1), short(MAX_ENTRIES)]
     """The schemes, each a kind or a mapping with its options."""
     sweep: SweepSection | None = None
     """Parameters that vary, by dotted path; several make a grid, in which the last one varies fastest."""
@@ -285,19 +248,32 @@ def json_schema(kind: type[Section]) -> dict[str, Any]:
 
 def schema() -> dict[str, Any]:
     """Return the JSON Schema of an experiment file with the built-in models and schemes."""
-    return json_schema(Document)
+    return _schema(MODELS.built_in, SCHEMES.built_in)
 
 
 def installed_schema() -> dict[str, Any]:
     """Return the same with the models and schemes of all installed packages."""
-    initial = WithJsonSchema(_initial_schema(MODELS.values()))
-    fields: dict[str, Any] = {
-        "model": (_any_model(MODELS), ...),
-        "initial": (Annotated[dict[str, Number], initial], {}),
-        "schemes": (_schemes(_any_scheme(SCHEMES)), ...),
+    return _schema(MODELS, SCHEMES)
+
+
+def _schema(models: Mapping[str, Model], schemes: Mapping[str, Scheme]) -> dict[str, Any]:
+    initial = WithJsonSchema(_initial_schema(models.values()))
+    any_model: Any = reduce(or_, map(model_section, models.values()))
+    words = {
+        "type": "string",
+        "enum": sorted(schemes),
+        "description": "A scheme with its defaults.",
     }
-    doc = Document.__doc__
-    result = json_schema(create_model("Document", __base__=Document, __doc__=doc, **fields))
-    result |= _states_are_known(MODELS.values())
-    result["$defs"]["SweepSection"]["patternProperties"] = swept_options(SCHEMES.values())
+    sections = map(scheme_section, schemes.values())
+    any_scheme: Any = reduce(or_, sections, Annotated[str, WithJsonSchema(words)])
+    fields: dict[str, Any] = {
+        "model": (any_model, ...),
+        "initial": (Annotated[dict[str, Number], initial], {}),
+        "schemes": (Annotated[tuple[any_scheme, ...], Field(min_length=1)], ...),
+    }
+    document = create_model("Document", __base__=Document, __doc__=Document.__doc__, **fields)
+    extra = {"oneOf": [{"required": ["levels"]}, {"required": ["tolerance"]}]}
+    document.model_config["json_schema_extra"] = extra | _states_are_known(models.values())
+    result = json_schema(document)
+    result["$defs"]["SweepSection"]["patternProperties"] = swept_options(schemes.values())
     return result

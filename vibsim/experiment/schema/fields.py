@@ -98,12 +98,6 @@ def tag(name: str) -> str:
     return f"\0{name}"
 
 
-def tagged(members: Mapping[str, Any], discriminator: Discriminator) -> Any:
-    """Return the tagged union of `members`, which maps tags to types."""
-    kinds: Any = (Annotated[kind, Tag(tag(name))] for name, kind in members.items())
-    return Annotated[reduce(or_, kinds), discriminator]
-
-
 _FORMS = ("mapping", "text", "number", "list", "rows", "row", "other")
 
 
@@ -128,7 +122,8 @@ def by_form(members: Mapping[str, Any], rule: str = "", error: str = "form") -> 
         return tag(next((name for name in forms if name in members), forms[0]))
 
     more: Any = {"custom_error_type": error, "custom_error_message": rule} if rule else {}
-    return tagged(members, Discriminator(form, **more))
+    kinds: Any = (Annotated[kind, Tag(tag(name))] for name, kind in members.items())
+    return Annotated[reduce(or_, kinds), Discriminator(form, **more)]
 
 
 def number(value: Any) -> float:

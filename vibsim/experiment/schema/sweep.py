@@ -25,7 +25,7 @@ from vibsim.experiment.schema.fields import (
     whole,
 )
 from vibsim.experiment.yaml.parse import Path_
-from vibsim.schemes import SCHEMES, NumberOption, Option, Scheme
+from vibsim.schemes import NumberOption, Option, Scheme
 from vibsim.schemes.base import EVENTS
 
 FLAGS: Mapping[bool, str] = {False: "false", True: "true"}
@@ -248,13 +248,8 @@ def _key(value: Any) -> Any:
 class SweepSection(ParameterSweep):
     """Parameters that vary, by dotted path; several make a grid in the order of the file, the last one fastest."""
 
-    model_config = ConfigDict(
-        extra="allow",
-        json_schema_extra={
-            "minProperties": 1,
-            "patternProperties": swept_options(SCHEMES.built_in.values()),
-        },
-    )
+    # `vibsim.experiment.schema.document` adds `swept_options`
+    model_config = ConfigDict(json_schema_extra={"minProperties": 1, "patternProperties": {}})
 
     follow: Annotated[Text, BeforeValidator(_key)] | None = None
     """A swept key along which each member starts from the final state of the previous one; it must vary fastest."""
