@@ -35,9 +35,8 @@ def summary_of(plan: Plan, results: Path) -> Mapping[str, Any] | None:
 
 def decisive(plan: Plan, summary: Mapping[str, Any] | None) -> tuple[int, str | None]:
     """Return the member and the scheme that decide the verdict; the first ones without a verdict on this file."""
-    if summary is None or are_outdated(plan, summary):
-        return 0, None
-    check = outcome_text.decisive(summary["checks"])
+    rows = [] if summary is None or are_outdated(plan, summary) else summary["checks"]
+    check = outcome_text.decisive(rows)
     if check is None or not check["results"]:
         return 0, None
     result = check["results"][0]

@@ -11,6 +11,7 @@ from vibsim.experiment.rules import size_limits
 from vibsim.experiment.rules.checks import finish_checks
 from vibsim.experiment.rules.members import update_tables
 from vibsim.experiment.rules.published import check_published
+from vibsim.experiment.rules.setting import Setting
 from vibsim.experiment.rules.timing import rising_levels
 from vibsim.experiment.schema.checks import (
     Check,
@@ -141,7 +142,7 @@ def with_levels(experiment: AnyExperiment, levels: Sequence[int]) -> AnyExperime
     report = Report(Source(str(experiment.file or experiment.name), {}))
     rising = rising_levels(read_value(("levels",), list(levels), Levels, report), report)
     report.raise_any()
-    setting = size_limits.Setting(
+    setting = Setting(
         model=experiment.model.definition,
         time=experiment.time,
         levels=rising,

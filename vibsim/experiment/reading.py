@@ -24,6 +24,7 @@ from vibsim.experiment.rules.model import Equation
 from vibsim.experiment.rules.model import equation as read_equation
 from vibsim.experiment.rules.published import check_published
 from vibsim.experiment.rules.scaling import Numbers, characteristic
+from vibsim.experiment.rules.setting import Setting
 from vibsim.experiment.rules.structure import check_histories
 from vibsim.experiment.rules.sweep import read_sweep
 from vibsim.experiment.rules.timing import rising_levels
@@ -179,7 +180,7 @@ def build(
 
 def _equation_and_setting(
     document: Any, folder: Path, report: Report
-) -> tuple[Equation, Numbers, size_limits.Setting]:
+) -> tuple[Equation, Numbers, Setting]:
     """Return the equation, its (scaled) numbers, and the setting that checks and size limits are validated against."""
     data = report.source.data
     swept = sorted(set(_dotted_keys(data.get("sweep"))))
@@ -198,7 +199,7 @@ def _equation_and_setting(
     numbers = Numbers(parameters, initial, time)
     if document.scaled:
         numbers = characteristic(numbers, model, swept, report)
-    setting = size_limits.Setting(
+    setting = Setting(
         model=model,
         time=numbers.time,
         levels=levels,
@@ -297,7 +298,7 @@ def _initial(
     return initial
 
 
-def _checks(document: Any, setting: size_limits.Setting, report: Report) -> tuple[Check, ...]:
+def _checks(document: Any, setting: Setting, report: Report) -> tuple[Check, ...]:
     """Return the checks of the file (default: every position converges), and the claims of its printed tables."""
     given, model = document.checks, setting.model
     if not given and not document.published and model is not None:
@@ -309,7 +310,7 @@ def _checks(document: Any, setting: size_limits.Setting, report: Report) -> tupl
     return (*checks, *rows)
 
 
-def _check_output(document: Any, setting: size_limits.Setting, report: Report) -> None:
+def _check_output(document: Any, setting: Setting, report: Report) -> None:
     """Refuse extrapolation over one level, of several coordinates, or with `follow`."""
     model = setting.model
     if document.output == "best" and len(setting.levels) == 1:

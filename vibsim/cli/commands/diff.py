@@ -10,6 +10,7 @@ from typing import Any, NamedTuple
 
 from vibsim.cli.chosen_plans import one_plan_of
 from vibsim.cli.jobs.common import chosen_results
+from vibsim.cli.level_member import are_outdated, summary_of
 from vibsim.cli.setting_changes import Change, differences
 from vibsim.cli.terminal import clean, painted
 from vibsim.core.home import called
@@ -73,10 +74,9 @@ def _side(word: str, results: Path) -> Side:
         made = read_provenance(folder / "convergence.nc")
         return Side(made["experiment"], str(summary["title"]), summary)
     plan = one_plan_of(word)
-    current = None
-    if (results / plan.summary).exists():
-        current = read_json(results / plan.summary, name=plan.key)
-        current = current if current.get("digest") == plan.analysis else None
+    current = summary_of(plan, results)
+    if current is not None and are_outdated(plan, current):
+        current = None
     return Side(analysed(plan.content), plan.title, current)
 
 

@@ -8,11 +8,10 @@ from argparse import Namespace
 
 from vibsim.cli.chosen_plans import one_plan_of
 from vibsim.cli.jobs.common import chosen_results
-from vibsim.cli.level_member import OUTDATED, are_outdated
+from vibsim.cli.level_member import OUTDATED, are_outdated, summary_of
 from vibsim.core.errors import VibsimError
 from vibsim.core.home import called
 from vibsim.core.set_option import command_to_run
-from vibsim.store import read_json
 
 
 def open_(options: Namespace) -> int:
@@ -28,8 +27,8 @@ def open_(options: Namespace) -> int:
         command = called("vibsim run" if word is None else command_to_run(word))
         raise VibsimError(f"{page}: there is no report yet: {command}")
     if plan is not None:
-        summary = results / plan.summary
-        if summary.is_file() and are_outdated(plan, read_json(summary, name=plan.key)):
+        summary = summary_of(plan, results)
+        if summary is not None and are_outdated(plan, summary):
             print(OUTDATED, file=sys.stderr)
     try:
         is_open = webbrowser.open(page.as_uri())

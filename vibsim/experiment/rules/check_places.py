@@ -10,7 +10,7 @@ import numpy as np
 from vibsim.core.errors import nearest
 from vibsim.experiment.data import TimeSpec
 from vibsim.experiment.faults import Report
-from vibsim.experiment.rules.size_limits import Setting
+from vibsim.experiment.rules.setting import Setting
 from vibsim.experiment.schema.checks import At, Members
 from vibsim.experiment.sweep_columns import Column, grid_columns, matching, members_with
 from vibsim.experiment.value_names import Value

@@ -11,7 +11,7 @@ from vibsim.core.vocabulary import BY_TOLERANCE, REASONS, is_error_part, plain_n
 from vibsim.experiment.faults import Report
 from vibsim.experiment.rules.check_places import Scope
 from vibsim.experiment.rules.quantities import check_velocities, is_quantity, vectors_of
-from vibsim.experiment.rules.size_limits import Setting
+from vibsim.experiment.rules.setting import Setting
 from vibsim.experiment.rules.values import (
     ENERGIES,
     check_exact,

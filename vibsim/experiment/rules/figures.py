@@ -8,7 +8,7 @@ from typing import Any
 from vibsim.core.errors import nearest
 from vibsim.experiment.faults import Report
 from vibsim.experiment.rules.check_places import Scope
-from vibsim.experiment.rules.size_limits import Setting
+from vibsim.experiment.rules.setting import Setting
 from vibsim.experiment.schema.figures import LEVEL, MEMBER, OVER_TIME
 from vibsim.formula import ExpressionError, parse
 from vibsim.models import quantities

@@ -8,7 +8,7 @@ from typing import Any
 from vibsim.experiment.faults import Report
 from vibsim.experiment.rules.check_places import Scope
 from vibsim.experiment.rules.quantities import check_velocities
-from vibsim.experiment.rules.size_limits import Setting
+from vibsim.experiment.rules.setting import Setting
 from vibsim.experiment.rules.values import (
     check_quantity_of,
     check_support,

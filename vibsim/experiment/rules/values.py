@@ -7,7 +7,7 @@ from vibsim.core.vocabulary import plain_name
 from vibsim.experiment.rules.check_places import Scope
 from vibsim.experiment.rules.potential import NOT_FOUND
 from vibsim.experiment.rules.quantities import is_quantity, vectors_of
-from vibsim.experiment.rules.size_limits import Setting
+from vibsim.experiment.rules.setting import Setting
 from vibsim.experiment.value_names import VALUES, Value
 from vibsim.models import BUDGET, centred, has_budget, has_solution
 from vibsim.models.base import Model, error_parts
