@@ -165,6 +165,8 @@ FAULTY: list[tuple[str, int, str, str, str]] = [
     ("spring: '  '", 0, "spring", "", "is empty"),
     ("spring: true", 0, "spring", "true", "must be a formula, or a number"),
     ("spring: [1]", 0, "spring", "[1]", "must be a formula, or a number"),
+    ("spring: .inf", 0, "spring", ".inf", "must be a finite number"),
+    ("damping: .nan", 0, "damping", ".nan", "must be a finite number"),
     ("spring: {linear: 1}", 0, "spring", "{linear: 1}", "must be a formula, or a number"),
     ("m: 0", 0, "m", "0", "must be greater than 0"),
     ("exact: cos(t)\nforce: sin(t)", 1, "force", "sin(t)", "not be given together with exact"),

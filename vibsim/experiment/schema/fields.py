@@ -221,6 +221,8 @@ class _Formula:
 
 def _as_text(value: Any) -> Any:
     """Return a number as the text of a formula, and text unchanged."""
+    if isinstance(value, float) and not math.isfinite(value):
+        raise refused("must be a finite number")
     if isinstance(value, int | float) and not isinstance(value, bool):
         return repr(value)
     if not isinstance(value, str):
