@@ -124,12 +124,8 @@ def work_alone(model: Model) -> float | None:
 def work(force_evaluations: int, explicit: bool, alone: float | None = None) -> tuple[float, float]:
     """Return the vectorised and the member-by-member work of a step, in explicit steps with one force evaluation.
 
-    Parameters
-    ----------
-    force_evaluations
-        Force evaluations per step; per iteration for an implicit scheme.
-    alone
-        What `work_alone` says of the model.
+    `force_evaluations` are those of a step, of an implicit scheme those of an iteration. `alone` is what `work_alone`
+    says of the model.
     """
     explicit_work, iterated = 1.0 + EVALUATION_WORK * (force_evaluations - 1), 0.0
     if not explicit:

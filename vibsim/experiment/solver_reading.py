@@ -25,7 +25,6 @@ from vibsim.experiment.schema.solver import (
     KINDS,
     MOST_LEVELS,
     RESERVED,
-    Kind,
     QuantitySection,
     SolverCheck,
     SolverConvergesCheck,
@@ -225,7 +224,7 @@ def _solver(
     section: Any, level_names: Sequence[str], swept: Sequence[str], report: Report
 ) -> SolverSpec | None:
     """Return the solver; None if it is faulty. Its placeholders are `level_names` and `swept` names."""
-    kind = None if section is None else given_one(section, KINDS, (SOLVER,), report)
+    kind: Any = section and given_one(section, KINDS, (SOLVER,), report)
     if not kind:
         return None
     text = getattr(section, kind)
@@ -234,8 +233,7 @@ def _solver(
         report.add((SOLVER, "inputs"), rule, at_key=True)
     if kind != "python":
         _check_template(kind, text, level_names, swept, report)
-    known: Kind = next(name for name in KINDS if name == kind)
-    return SolverSpec.model_construct(kind=known, text=text, inputs=section.inputs)
+    return SolverSpec.model_construct(kind=kind, text=text, inputs=section.inputs)
 
 
 def _check_template(

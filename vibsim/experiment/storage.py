@@ -31,14 +31,8 @@ def stride(samples: int | str, coarsest: int, steps: int, trajectories: int) -> 
     thins the times of the coarsest level. A number n applies to every level; the levels then share the stored times of
     the coarsest one.
 
-    Parameters
-    ----------
-    samples
-        The value in the file: ``auto``, ``common``, ``all``, or the stride n, a divisor of `coarsest`.
-    coarsest, steps
-        Number of steps of the coarsest level, and of this one.
-    trajectories
-        Number of schemes times number of members.
+    `coarsest` and `steps` are the numbers of steps of the coarsest level and of this one, and n divides the first;
+    `trajectories` is the number of schemes times that of members.
     """
     if isinstance(samples, int):
         return samples

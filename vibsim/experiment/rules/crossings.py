@@ -17,14 +17,9 @@ from vibsim.models.shared.crossings import STOP, guard_name, guard_of, is_consta
 def read_crossings(
     section: Any, model: Model, known: Collection[str], report: Report
 ) -> dict[str, str]:
-    """Return the formulas of events and stop by name, and report their faults.
+    """Return the formulas of events and stop of a section ``model`` by name, and report their faults.
 
-    Parameters
-    ----------
-    section
-        The section ``model``.
-    known
-        Names of all model parameters.
+    `known` holds the names of all its parameters.
     """
     states = tuple(state.name for state in model.states)
     names = (*states, "t", *known)

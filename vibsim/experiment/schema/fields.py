@@ -81,9 +81,6 @@ class FrozenDict(dict[str, Any]):
     def __reduce__(self) -> tuple[Any, ...]:
         return (FrozenDict, (dict(self),))
 
-    def __copy__(self) -> FrozenDict:
-        return self
-
     def __deepcopy__(self, memo: object) -> FrozenDict:
         return self
 

@@ -37,17 +37,10 @@ _POINTS = "write all numbers with points"
 
 
 class CsvError(ValueError):
-    """Text that is not a table of numbers.
+    """Text that is not a table of numbers: the rule that it breaks, a hint, and where.
 
-    Parameters
-    ----------
-    rule, hint
-        The rule that is broken, and a hint.
-    line
-        Line of the text, from 1; 0 if no particular line is faulty.
-    column, cell
-        Name of the faulty column, and text of the faulty cell; empty if there is none. The file may not be a table at
-        all, so messages show its content only to a user who named the file.
+    `line` counts from 1, and is 0 if no particular line is faulty; `column` and `cell` are the name and the text of a
+    faulty cell. The file may not be a table at all, so messages show its content only to a user who named the file.
     """
 
     def __init__(

@@ -123,17 +123,12 @@ def read(path: Path, keys: Collection[str] = ()) -> Source:
 
 
 def parse(content: bytes, file: str, keys: Collection[str] = ()) -> Source:
-    """Return the data of one YAML document.
+    """Return the data of one YAML document, whose name in messages is `file`.
+
+    Of `keys` an experiment file has at least one. Messages show no content of any other file, which may be private.
+    Without `keys` any file is accepted.
 
     Raises `InputError` at the first syntax error, together with the duplicate keys and tags before it.
-
-    Parameters
-    ----------
-    file
-        Name of the file in messages.
-    keys
-        Keys of which an experiment file has at least one. Messages show no content of any other file, which may be
-        private. Empty accepts any file.
     """
     try:
         text = content.decode("utf-8-sig")
