@@ -12,7 +12,7 @@ from typing import Annotated, Any, Literal, TypeVar
 
 from pydantic import AfterValidator, Field, PrivateAttr, StrictBool
 
-from vibsim.core.errors import Fault, InputError, VibsimError
+from vibsim.core.errors import Fault, InputError
 from vibsim.core.set_option import command_to_run
 from vibsim.experiment.collection import ADHOC
 from vibsim.experiment.schema.checks import Check, ConservesCheck, EqualCheck, ValueCheck
@@ -61,8 +61,7 @@ class TableSpec(Section):
     @property
     def table(self) -> Table:
         """The numbers, attached by `vibsim.experiment.tables.file.attach`."""
-        if self._table is None:
-            raise VibsimError(f"the table {self.file} was not read")
+        assert self._table is not None
         return self._table
 
 
@@ -103,8 +102,7 @@ class StructureSpec(Section):
     @property
     def structure(self) -> Structure:
         """The numbers, attached by `vibsim.experiment.tables.structure.attach`."""
-        if self._structure is None:
-            raise VibsimError("the matrices of the structure were not read")
+        assert self._structure is not None
         return self._structure
 
 

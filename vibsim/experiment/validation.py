@@ -47,8 +47,7 @@ def read_document(report: Report, kind: type[Section] = Document) -> Any:
 
 def read_value(path: Path_, raw: Any, annotation: Any, report: Report) -> Any:
     """Return a validated value that comes from no file; report its faults and return None if it has any."""
-    reader = _Reader(report, Units({}, report))
-    value = reader.value(path, raw, _Expected(annotation), keep_valid=False)
+    value = _Reader(report, None).value(path, raw, _Expected(annotation), keep_valid=False)
     return None if value is _FAULTY else value
 
 
