@@ -111,9 +111,8 @@ def describe(f: MemberFacts, check: ValueCheck) -> Description:
                 advice += " If the motion is not steady yet, a longer run helps (`time: periods`)."
         case "non_finite":
             sentence, advice = NOT_FINITE[0].format(subject), NOT_FINITE[1]
-        case "not_applicable" if check.at.event is not None:
-            sentence = f"{subject} does not exist: fewer events happen until the end."
-            advice = "Ask for an earlier `event:`, or make `time: end` later."
+        case "not_applicable" if check.number.needs_events:
+            sentence, advice = _without_event(subject, check)
         case "not_applicable" if check.quantity is not None and is_error_part(check.quantity):
             sentence, advice = f"{subject} {NO_PART}.", PART_ADVICE
         case "not_applicable":
@@ -137,6 +136,24 @@ def describe(f: MemberFacts, check: ValueCheck) -> Description:
     number = f.fact("value")
     brief = _measured(f, check, _digits(number, room(check, number)))
     return Description(sentence, advice, brief)
+
+
+def _without_event(subject: str, check: ValueCheck) -> tuple[str, str]:
+    """Say why the time of an event does not exist, and what to change."""
+    later = "make `time: end` later"
+    if check.at.event is not None:
+        why, advice = (
+            "fewer events happen until the end",
+            f"Ask for an earlier `event:`, or {later}.",
+        )
+    elif check.value == "rest_time":
+        why, advice = "the body moves at the end", f"If it ever comes to rest, {later}."
+    else:
+        why, advice = "no event happens until the end", f"If one is to come, {later}."
+    return (
+        f"{subject} does not exist: {why}.",
+        f"{advice} Otherwise leave the check out (`checks:`).",
+    )
 
 
 def _digits(number: float, room: float) -> int:
