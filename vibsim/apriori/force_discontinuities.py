@@ -1,16 +1,17 @@
 """Find the roughest corner of the force inside a step, and the highest power of dt that errors keep there.
 
-A step across a jump of the k-th derivative of the force has an error of order dt^(k+1) that depends on the position of
-the jump within the step, which differs between levels. So no order above k + 1 is regular once the motion meets a jump:
-k + 1 is 1 for a jump of the force, 2 for ``abs(u)``, and 3 for quadratic damping ``abs(v) v`` where the velocity
-vanishes. At a grid point only a jump of the force itself matters, because the steps before and after the point evaluate
-the same one of its two values. Switches (`vibsim.formula.jumps`) are followed along the samples of the finest level,
-and k follows from the difference of the two formulas on either side. The corners of tables are known in advance
-(`vibsim.apriori.table_corners`).
+Where the force changes by d^k at a distance d behind a point, a step across that point has an error of order dt^(k+1)
+that depends on the position of the point within the step, which differs between levels. So no order above k + 1 is
+regular once the motion meets it: k + 1 is 1 for a jump of the force, 2 for ``abs(u)``, 2.5 for ``max(u, 0)**1.5``, and
+3 for quadratic damping ``abs(v) v`` where the velocity vanishes. At a grid point only a jump of the force itself
+matters, because the steps before and after the point evaluate the same one of its two values. Switches
+(`vibsim.formula.jumps`) are followed along the samples of the finest level, and k follows from the difference of the
+two formulas on either side. The corners of tables are known in advance (`vibsim.apriori.table_corners`).
 """
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache
@@ -29,8 +30,12 @@ from vibsim.models import Model
 from vibsim.simulation.members import Members
 from vibsim.simulation.reference.one_sided_forces import TABLE, Sides, sides
 
-FAR, NEAR = 1.0 / 16.0, 1.0 / 128.0
+DISTANCES = (1.0 / 16.0, 1.0 / 128.0, 1.0 / 1024.0)
 """Distances from the corner at which both formulas are compared, over the largest switch quantity. [convention]"""
+DIGITS_LEFT = 3.5
+"""Power below which the difference at the least distance has enough digits to measure a power. [derived]"""
+WHOLE = 0.1
+"""Distance from a whole power within which a measured one counts as whole. [convention]"""
 HALVINGS = 40
 """Number of bisections that locate a corner within a step. [convention]"""
 ROUGH = 2.0
@@ -287,17 +292,32 @@ class _Path:
         return 0.5 * (low + high)
 
     def power(self, edge: Floats, size: Floats) -> Floats:
-        """Return k + 1, shape (n,): both formulas differ as distance^k near the corner; NaN where they agree."""
+        """Return k + 1, shape (n,): both formulas differ as distance^k near the corner; NaN where they agree.
+
+        The power between two distances d has an error in proportion to d.
+        """
         s = self.crossing(edge)
         slope = self.quantity(np.ones(len(s))) - self.quantity(np.zeros(len(s)))
-        gaps = []
-        for distance in (FAR, NEAR):
-            place = self.at(s + distance * size / slope)
-            before, after = (self.law.force(modes)(*place) for modes in self.modes)
-            gaps.append(np.max(np.abs(after - before), axis=0))
-        k = np.round(on_arrays.log(gaps[0] / gaps[1]) / on_arrays.log(FAR / NEAR))
+        gaps = [self._gap(s, distance * size / slope) for distance in DISTANCES]
+        fall = DISTANCES[0] / DISTANCES[1]
+        far, near = (
+            on_arrays.log(a / b) / on_arrays.log(fall) for a, b in itertools.pairwise(gaps)
+        )
+        k = np.where(far < DIGITS_LEFT, (fall * near - far) / (fall - 1.0), far)
+        whole = np.round(k)
+        k = np.where((np.abs(k - whole) <= WHOLE) | (far >= DIGITS_LEFT), whole, np.round(k, 2))
         exists = (gaps[0] > 0.0) & (k < MOST_SMOOTH)
         return np.where(exists, np.maximum(k, 0.0) + 1.0, np.nan)
+
+    def _gap(self, s: Floats, distance: Floats) -> Floats:
+        """Return the mean difference of both formulas on the two sides of a fraction `s`, or that where both exist."""
+        sides = []
+        for place in (self.at(s + distance), self.at(s - distance)):
+            before, after = (self.law.force(modes)(*place) for modes in self.modes)
+            sides.append(np.max(np.abs(after - before), axis=0))
+        there, back = sides
+        mean = 0.5 * (there + back)
+        return np.asarray(np.where(np.isnan(mean), np.fmax(there, back), mean))
 
 
 def corner_variables(model: Model, corners: Corners) -> dict[str, Variable]:

@@ -237,6 +237,9 @@ class _Phrases(OrderContext):
 
     def jump(self) -> str:
         power = self.corner.power if self.corner else math.nan
+        if power % 1.0:
+            least = self.notation.number(power - 1.0)
+            return f"the force changes like the power {least} of the distance"
         known = {1.0: "the force jumps", 2.0: "the force has a corner"}
         return known.get(power, "a derivative of the force jumps")
 

@@ -46,6 +46,8 @@ DIRECTION_ASKED = {1.0: "rising", -1.0: "falling", 0.0: "neither rising nor fall
 UNPROVED = (
     " The levels agree with it, but do not prove it: the error bound is wider than what is asked."
 )
+NEAR_THE_END = 0.1
+"""Part of the mean time between events within which the last one may explain why another level has one less."""
 FEWEST_DIGITS, MOST_DIGITS = 4, 10
 """Significant digits of a measured number."""
 
@@ -109,9 +111,8 @@ def describe(f: MemberFacts, check: ValueCheck) -> Description:
                 advice += " If the motion is not steady yet, a longer run helps (`time: periods`)."
         case "non_finite":
             sentence, advice = NOT_FINITE[0].format(subject), NOT_FINITE[1]
-        case "not_applicable" if check.at.event is not None:
-            sentence = f"{subject} does not exist: fewer events happen until the end."
-            advice = "Ask for an earlier `event:`, or make `time: end` later."
+        case "not_applicable" if check.number.needs_events:
+            sentence, advice = _without_event(subject, check)
         case "not_applicable" if check.quantity is not None and is_error_part(check.quantity):
             sentence, advice = f"{subject} {NO_PART}.", PART_ADVICE
         case "not_applicable":
@@ -135,6 +136,24 @@ def describe(f: MemberFacts, check: ValueCheck) -> Description:
     number = f.fact("value")
     brief = _measured(f, check, _digits(number, room(check, number)))
     return Description(sentence, advice, brief)
+
+
+def _without_event(subject: str, check: ValueCheck) -> tuple[str, str]:
+    """Say why the time of an event does not exist, and what to change."""
+    later = "make `time: end` later"
+    if check.at.event is not None:
+        why, advice = (
+            "fewer events happen until the end",
+            f"Ask for an earlier `event:`, or {later}.",
+        )
+    elif check.value == "rest_time":
+        why, advice = "the body moves at the end", f"If it ever comes to rest, {later}."
+    else:
+        why, advice = "no event happens until the end", f"If one is to come, {later}."
+    return (
+        f"{subject} does not exist: {why}.",
+        f"{advice} Otherwise leave the check out (`checks:`).",
+    )
 
 
 def _digits(number: float, room: float) -> int:
@@ -189,6 +208,8 @@ def _why_unknown(f: MemberFacts, check: ValueCheck) -> str:
     if check.value == "peak_frequency" and math.isinf(f.fact("error_bound")):
         return ", because the lines around the highest one are not those of a cosine"
     if _is_of_events_at_end(f, check):
+        if differing := _differing_events(f):
+            return f", because the levels differ in their number of events: {differing}"
         return ", because no level tells whether an event happens before the end of the run"
     numbers = _by_level_of(f, check)
     if len(numbers) >= LEVELS_OF_AN_ORDER and np.all(np.isfinite(numbers)):
@@ -215,6 +236,27 @@ def _is_of_events_at_end(f: MemberFacts, check: ValueCheck) -> bool:
     return may_depend and has_events and math.isinf(f.fact("error_bound"))
 
 
+def _differing_events(f: MemberFacts) -> str:
+    """List the numbers of events of the finest levels if they differ, and no event near the end explains that."""
+    if "last_event_time" not in f.record:
+        return ""
+    first = max(len(f.experiment.levels) - LEVELS_OF_AN_ORDER, 0)
+    counts, last = (
+        f.record[name][f.scheme, f.case, first:] for name in ("event_count", "last_event_time")
+    )
+    end = float(f.record["t"][-1])
+    end *= float(f.record["end"][f.case]) if "end" in f.record else 1.0
+    has_more = counts > np.min(counts)
+    since_last = end - last[has_more]
+    if not np.any(has_more) or np.any(since_last <= NEAR_THE_END * end / counts[has_more]):
+        return ""
+    *others, finest = (
+        f"{count:.0f} on level {level}"
+        for count, level in zip(counts, f.experiment.levels[first:], strict=True)
+    )
+    return f"{', '.join(others)} and {finest}"
+
+
 def advice_on_bound(f: MemberFacts, check: ValueCheck) -> str:
     """Say what to change if no finer level can bound the error of a number; empty otherwise."""
     if _is_on_the_mesh(f, check):
@@ -224,6 +266,11 @@ def advice_on_bound(f: MemberFacts, check: ValueCheck) -> str:
     if _has_few_periods(f, check):
         return f"Give {LEAST_PERIODS} or more `periods:`."
     if _is_of_events_at_end(f, check):
+        if _differing_events(f):
+            return (
+                f"A{finer_levels(f)}, until they have the same events. If the motion only just meets the condition of "
+                "an event, change `model:` or `initial:`."
+            )
         return "Let the run end a little earlier or later (`time: end`)."
     numbers = _by_level_of(f, check)
     bound = f.fact("error_bound")

@@ -122,6 +122,24 @@ def test_what_no_level_shows_is_not_decided(
     assert advice in text
 
 
+@pytest.mark.usefixtures("with_series")
+def test_levels_that_differ_in_their_events_long_before_the_end_are_named() -> None:
+    """The second crest of a resonance is just above a stop; the finest level alone meets it, 5 s before the end."""
+    content = {
+        "model": {"kind": "oscillator", "spring": "u", "force": "cos(t)"},
+        "events": [{"when": "u - 3.9568636857938907", "rising": True, "then": {"v": "-0.8*v"}}],
+        "initial": {"u": 0.0},
+        "time": {"end": 13.14, "base_steps": 32},
+        "levels": [0, 1, 2, 3],
+        "schemes": ["rk4"],
+    }
+    (found,) = run(content, {"value": "event_count", "equals": 1}).verdicts
+    assert found.status == "INCONCLUSIVE"
+    assert "number of events: 0 on level 1, 0 on level 2 and 1 on level 3" in found.text
+    assert "Add levels 4" in found.advice
+    assert "end of the run" not in found.text
+
+
 @pytest.mark.parametrize(
     ("end", "event", "count"),
     [

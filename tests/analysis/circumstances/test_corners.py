@@ -142,6 +142,9 @@ def corner(model: dict[str, Any], **changes: Any) -> tuple[float, float, str]:
         ({"spring": "u + abs(u)/1000"}, math.pi / 2, 2.0, "u passes zero"),
         ({"spring": "u + sign(u)/1000"}, math.pi / 2, 1.0, "u passes zero"),
         ({"spring": "u + max(u - 0.5, 0)/1000"}, math.pi / 3, 2.0, "u - 0.5 passes zero"),
+        # a contact of two balls, which the motion leaves and which it enters
+        ({"spring": "u + max(u - 0.5, 0)**1.5/1000"}, math.pi / 3, 2.5, "u - 0.5 passes zero"),
+        ({"spring": "u + max(-u, 0)**1.5/1000"}, math.pi / 2, 2.5, "u passes zero"),
         ({"force": "heaviside(t - 3.01)"}, 3.01, 1.0, "t - 3.01 passes zero"),
         ({"force": "max(t - 3.01, 0)**3"}, 3.01, 4.0, "t - 3.01 passes zero"),
         ({"force": "mod(t, 1.7)/9"}, 1.7, 1.0, "t/1.7 passes a whole number"),

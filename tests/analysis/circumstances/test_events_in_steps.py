@@ -287,6 +287,18 @@ def test_the_time_of_an_event_has_an_error_from_the_levels() -> None:
     assert "fewer events happen" in found[5].text
 
 
+def test_a_body_that_does_not_rest_is_said_to_move_at_the_end() -> None:
+    """More samples were advised."""
+    checks = [{"value": name, "below": 9.0} for name in ("rest_time", "last_event_time")]
+    made = beads(["rk4"], checks)
+    record = analyse(made, [simulate(made, level) for level in made.levels])
+    rest, last = verdicts(made, record)
+    assert (rest.status, rest.reason) == ("INCONCLUSIVE", "not_applicable")
+    assert "the body moves at the end" in rest.text
+    assert "samples" not in rest.advice
+    assert last.reason != "not_applicable"
+
+
 def test_the_time_of_an_event_on_the_mesh_is_not_trusted() -> None:
     near = [time_of(3, equals=impact(3), atol=0.5), time_of(3, equals=9.0, atol=0.5)]
     made = beads([SCHEMES["mesh"]], near)
