@@ -380,7 +380,7 @@ def test_every_reason_has_a_sentence() -> None:
 
     # levels alone do not show these; `not_applicable` is a case of the interpolation
     others = {"match", "mismatch", "unstable", "non_smooth", "not_applicable"}
-    cases = {"interpolation", "growing", "rounded", "contradicted"}
+    cases = {"interpolation", "growing", "blown_up", "rounded", "contradicted"}
     assert set(SENTENCES) == REASONS.keys() - others | cases
     for reason, status in REASONS.items():
         if reason in others:
@@ -454,7 +454,7 @@ def test_a_verdict_is_drawn(tmp_path: Path) -> None:
         ({"values": 3.0}, "values: float: must be a list"),
         ({"values": "abc"}, "values: str: must be a list"),
         ({"values": [], "h": []}, "at least one level"),
-        ({"values": ["a", "b", "c", "d", "e"]}, r"values\[0\]: str.*: must hold numbers"),
+        ({"values": ["a", "b", "c", "d", "e"]}, r"values\[0\]: a: must hold numbers"),
         ({"values": [1j, 2j, 3j, 4j, 5j]}, r"values\[0\].*must be real"),
         ({"values": [pandas.Series([1.0, 2.0], [0.0, 0.1])] * 5}, r"Series: .*value.to_xarray\(\)"),
         ({"values": [np.empty(0)] * 5}, r"values\[0\].*must not be empty"),
@@ -470,7 +470,7 @@ def test_a_verdict_is_drawn(tmp_path: Path) -> None:
         ({"exact": np.nan}, "exact: values: must be finite"),
         ({"exact": [1.0, 2.0]}, r"exact: values: has shape \(2,\), and the common points have \(\)"),
         ({"exact": np.cos}, "exact.*is a function, and the values have no coordinates"),
-        ({"exact": "pi"}, "exact: .*must hold numbers"),
+        ({"exact": "pi"}, "exact: pi: must hold numbers"),
     ],
     ids=str,
 )  # fmt: skip

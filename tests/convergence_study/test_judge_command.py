@@ -445,6 +445,32 @@ def test_files_that_do_not_fit_are_refused(tmp_path: Path, capsys: Capture) -> N
         assert captured.out == ""
 
 
+def test_a_level_that_does_not_fit_is_named_by_its_file(tmp_path: Path, capsys: Capture) -> None:
+    files = [write(tmp_path / f"run_{n}.nc", n) for n in (40, 20, 10)]
+    with netCDF4.Dataset(files[0], "a") as file:
+        file["T"].units = "m"
+    with netCDF4.Dataset(files[2], "a") as file:
+        file["T"].units = "K"
+    assert main(["judge", *files, "--h", "dx", "--quantity", "T"]) == 2
+    told = f"T: {files[0]}: T: has the unit m, the coarsest level has K"
+    assert told in capsys.readouterr().err
+
+
+def test_a_packed_variable_is_known_to_its_spacing(tmp_path: Path, capsys: Capture) -> None:
+    """All levels round to the same integer, although their errors differ."""
+    files = [str(tmp_path / f"run_{n}.nc") for n in (10, 20, 40)]
+    for name, n in zip(files, (10, 20, 40), strict=True):
+        with netCDF4.Dataset(name, "w") as file:
+            file.dx = 1.0 / n
+            variable = file.createVariable("T", "i2")
+            variable.scale_factor, variable.add_offset = 0.0123, 0.5
+            variable[...] = 1.0 + 0.1 / n**2
+    assert main(["judge", *files, "--h", "dx", "--quantity", "T", "--json"]) == 0
+    (verdict,) = entries(capsys)
+    assert verdict["error_bound"] == pytest.approx(0.0123 / 2)
+    assert "rounding of the values" in verdict["sentence"]
+
+
 def test_missing_values_of_a_file_are_not_finite(tmp_path: Path, capsys: Capture) -> None:
     files = [write(tmp_path / f"run_{n}.nc", n) for n in (10, 20, 40)]
     with netCDF4.Dataset(files[1], "a") as file:

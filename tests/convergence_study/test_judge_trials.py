@@ -257,6 +257,7 @@ def test_equal_levels_that_may_be_exact_are_not_taken_for_printed_numbers(value:
             1.0,
             0.005,
         ),  # the same place on four grids
+        ([2e-32, 6e-32, 0.5, 0.5], 0.3, 0.51),  # round-off is no step
     ],
 )
 def test_values_that_come_in_steps_are_no_better_than_a_step(
@@ -268,7 +269,7 @@ def test_values_that_come_in_steps_are_no_better_than_a_step(
     assert verdict.best_bound is not None
     assert abs(verdict.best - exact) <= verdict.best_bound <= within
     assert ("come in steps" in verdict.sentence) == (
-        levels[0] in (8.0379364312, 0.9978456732198741)
+        levels[0] in (8.0379364312, 0.9978456732198741, 2e-32)
     )
     assert judge(h, levels, exact=exact).reason != "wrong_limit"
 
@@ -297,6 +298,68 @@ def test_differences_that_grow_decide_nothing(order: float | None) -> None:
     verdict = judge([1 / k for k in n], values, order=order)
     assert (verdict.status, verdict.reason) == ("INCONCLUSIVE", "pre_asymptotic")
     assert verdict.error_bound is None
+
+
+@pytest.mark.parametrize(
+    "blown_up", [[0.24, 0.25, 6e21, -3e138], [0.24, 0.23, 0.25, -70.0], [1.0, -5.0, 1e5, -1e30]]
+)
+def test_an_unstable_solver_is_told_of_and_has_no_error(blown_up: list[float]) -> None:
+    """The differences change their sign, so that there is no order."""
+    shape = np.array([1.0, 0.9, 1.1])
+    exact = 0.2 * shape
+    for values, truth in ((blown_up, 0.2), ([x * shape for x in blown_up], exact)):
+        verdict = judge(H, values, order=2)
+        assert (verdict.status, verdict.order) == ("INCONCLUSIVE", None)
+        assert (verdict.error, verdict.error_bound, verdict.best) == (None, None, None)
+        assert ("as with an unstable solver" in verdict.sentence) == (abs(blown_up[-1]) > 1e3)
+        assert "grow" in verdict.sentence
+        assert "finer level" not in verdict.advice or abs(blown_up[-1]) < 1e3
+        known = judge(H, values, order=2, exact=truth)
+        assert known.status != "PASS"
+        assert known.error is not None
+        assert abs(known.error) > 60.0
+
+
+def test_growth_in_the_window_comes_before_what_contradicts_it() -> None:
+    verdict = judge(H, [1.0, 3.0, 1e5, 1e30], order=2)
+    assert "as with an unstable solver" in verdict.sentence
+    assert "contradict" not in verdict.sentence
+
+
+def test_a_small_difference_by_chance_is_no_growth() -> None:
+    """Of noise, and of an error that vanishes at one level."""
+    noisy = judge(H, [1.0001, 1.0000, 1.00001, 1.0021], order=2, noise=1e-3)
+    crossing = judge(H[:3], [1.0100, 1.0101, 1.0051], order=2)
+    for verdict in (noisy, crossing):
+        assert "unstable" not in verdict.sentence
+    assert noisy.error_bound is not None
+
+
+@pytest.mark.parametrize("number", [True, False])
+def test_values_that_were_packed_into_integers_are_known_to_their_spacing(number: bool) -> None:
+    """Errors of order 1, 2 and 4 that come near the spacing of the packed values."""
+    rng = np.random.default_rng(1)
+    missed, hidden = 0, 0
+    for _ in range(60):
+        counts = [10, 20, 40, 80][: rng.choice([3, 4])]
+        order, spacing = rng.choice([1, 2, 4]), 1.2345678 * 10 ** rng.uniform(-6, -3)
+        a, b, size = rng.uniform([1, 1, 0.05], [8, 8, 0.5])
+        levels = []
+        for n in counts:
+            x = np.linspace(0.0, 1.0, n + 1)[n // 2 if number else 0 :: n if number else 1]
+            u = np.sin(a * x) + size * np.cos(b * x) * (10 / n) ** order
+            level = xarray.DataArray(spacing * np.round((u - 0.3) / spacing) + 0.3, {"x": x}, ["x"])
+            level.encoding = {"dtype": "int16", "scale_factor": spacing, "add_offset": 0.3}
+            levels.append(level)
+        verdict = judge([1 / n for n in counts], levels, order=order)
+        truth = np.sin(a * levels[0].x)
+        exact = judge([1 / n for n in counts], levels, order=order, exact=truth)
+        assert verdict.status != "FAIL"
+        assert exact.error is not None
+        if verdict.error_bound is not None:
+            missed += abs(exact.error) > verdict.error_bound
+            hidden += verdict.error_bound < spacing / 2.0
+    assert missed == hidden == 0
 
 
 def test_stated_noise_misses_an_exact_value_no_more_often_than_it_differs() -> None:
@@ -552,3 +615,9 @@ def test_coordinates_that_number_the_points_are_told_of(kind: str) -> None:
     h = [1 / n for n in counts]
     assert told in judge(h, numbered, order=2, restrict=kind).advice
     assert told not in judge(h, placed, order=1, restrict=kind).advice
+
+
+def test_an_exact_function_that_takes_no_arrays_is_told_how_it_is_called() -> None:
+    levels = on_grids([10, 20, 40], 2.0)
+    with pytest.raises(InputError, match=r"raised TypeError .* use np\.sin instead of math\.sin"):
+        judge([0.1, 0.05, 0.025], levels, exact=lambda x: math.sin(math.pi * x))

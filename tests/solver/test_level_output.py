@@ -58,6 +58,16 @@ def test_the_precision_of_values_is_kept(read: Read) -> None:
     assert found["u"].values.dtype == np.float64
 
 
+def test_the_spacing_of_packed_values_is_kept_and_stored(tmp_path: Path) -> None:
+    packed = {"flux": {"dtype": "int16", "scale_factor": 0.25, "_FillValue": -1}}
+    dataset(flux=2.5).to_netcdf(tmp_path / "output", encoding=packed)
+    by_file = level_output.read(tmp_path / "output", WANTED)
+    with xarray.open_dataset(tmp_path / "output") as opened:
+        by_function = level_output.from_dataset(opened.load(), WANTED)
+    for found in (by_file, by_function):
+        assert (found["flux"].spacing, found["u"].spacing) == (0.25, 0.0)
+
+
 def test_a_coordinate_may_lie_along_a_dimension_of_another_name(read: Read) -> None:
     fields = {"u": (("node", "t"), FIELD), "flux": 2.5}
     found = read(xarray.Dataset(fields, {"x": ("node", X), "t": T}))

@@ -233,3 +233,16 @@ def test_stored_levels_keep_the_units_of_their_coordinates(tmp_path: Path) -> No
     verdict = analysis.judge_members(found, read)[0].results[0].verdict
     assert verdict.status == "PASS"
     assert len(verdict.coords["t"]) == 5
+
+
+def test_stored_levels_keep_the_spacing_of_packed_values(tmp_path: Path) -> None:
+    """The levels agree because all were rounded to the same integer in the files of the solver."""
+    found = experiment(tmp_path, "[{converges: u}]")
+
+    def read(member: int) -> list[Any]:
+        level = GridValues(np.array(1.0 / 3.0), (), {}, "u", spacing=0.01)
+        count = len(found.sizes[found.step])
+        return [level_output.record(found, i, member, {"u": level}) for i in range(count)]
+
+    verdict = analysis.judge_members(found, read)[0].results[0].verdict
+    assert verdict.error_bound == pytest.approx(0.005)

@@ -10,7 +10,13 @@ from typing import Any, NoReturn
 import numpy as np
 from numpy.typing import NDArray
 
-from vibsim.convergence.study.grid_values import GridValues, plain_coordinate, real, units_in
+from vibsim.convergence.study.grid_values import (
+    GridValues,
+    plain_coordinate,
+    real,
+    spacing_in,
+    units_in,
+)
 from vibsim.core import netcdf, regular_files
 from vibsim.core.errors import Fault, InputError, nearest
 from vibsim.solver.level_tables import Study, check_sizes
@@ -167,6 +173,8 @@ def grid_values(
         epsilon,
         units_in(_attributes(variable))[0],
         {new: units_in(_attributes(row)) for new, row in coordinates.items()},
+        spacing=spacing_in({"dtype": variable.dtype, **_attributes(variable)}),
+        file=file,
     )
 
 

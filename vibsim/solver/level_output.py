@@ -26,6 +26,8 @@ EPSILON = "epsilon"
 """Attribute with the machine epsilon of the precision that the values were computed in."""
 WRITTEN = "written"
 """Attribute of a number with the digits that it was written with in a table."""
+SPACING = "spacing"
+"""Attribute with the distance of neighbouring values that were packed into integers."""
 
 
 def read(path: Path, quantities: Quantities, *, is_shown: bool = True) -> dict[str, GridValues]:
@@ -157,9 +159,12 @@ def record(
                 coords[dim] = Variable((dim,), np.asarray(points), text)
     variables = {}
     for name, quantity in values.items():
-        digits = {} if quantity.written is None else {WRITTEN: str(quantity.written)}
-        units = quantity.units or NO_UNIT
-        text = attributes(name, units, **{EPSILON: quantity.epsilon}, **digits)
+        rounding: dict[str, Any] = {EPSILON: quantity.epsilon}
+        if quantity.written is not None:
+            rounding[WRITTEN] = str(quantity.written)
+        if quantity.spacing:
+            rounding[SPACING] = quantity.spacing
+        text = attributes(name, quantity.units or NO_UNIT, **rounding)
         variables[name] = Variable(quantity.dims, quantity.values, text)
     return Record(coords, variables)
 
@@ -173,7 +178,9 @@ def stored(level: Record, name: str) -> GridValues:
     """Return a quantity from the stored Record of a level."""
     variable = level.variable(name)
     epsilon = variable.attrs[EPSILON]
+    spacing = variable.attrs.get(SPACING, 0.0)
     assert isinstance(epsilon, float)
+    assert isinstance(spacing, float)
     coords = {dim: level[dim] for dim in variable.dims if dim in level.coords}
     digits = variable.attrs.get(WRITTEN)
     return GridValues(
@@ -185,4 +192,5 @@ def stored(level: Record, name: str) -> GridValues:
         units_in(variable.attrs)[0],
         {dim: units_in(level.coords[dim].attrs) for dim in coords},
         None if digits is None else Decimal(str(digits)),
+        spacing,
     )

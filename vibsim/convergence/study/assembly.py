@@ -81,6 +81,7 @@ def verdict(
         is_proportional=steps.is_proportional,
         interpolation=(common.kind, common.interpolation_order or 0) if hidden else None,
         is_contradicted=outcome.is_contradicted,
+        is_growing=outcome.is_growing,
         are_sizes_rounded=_order_shift(outcome, h) > ORDER_TOLERANCE,
         notes=(*common.notes, *_interpolated_linearly(common, reason)),
         parts=(*common.parts, *_left_out(outcome), *_rounding(outcome)),

@@ -69,7 +69,7 @@ def common_values(
     for i, level in enumerate(levels):
         if set(level.dims) != set(first.dims) or len(level.dims) != len(first.dims):
             rule = f"has the dimensions {_listed(level.dims)}, the coarsest level has {_listed(first.dims)}"
-            raise refused(f"level {i} (from the coarsest)", level.name or "values", rule)
+            raise refused(level.place(i), level.name or "values", rule)
     refined = first.dims if dims is None else dims
     for dim in refined:
         if dim not in first.dims:
@@ -186,7 +186,11 @@ def _of_function(exact: Callable[..., Any], common: CommonValues, dims: Sequence
         raise refused("exact", "a function", rule)
 
     def evaluate(grids: Sequence[Floats]) -> Any:
-        return exact(**dict(zip(dims, grids, strict=True))) if by_name else exact(*grids)
+        try:
+            return exact(**dict(zip(dims, grids, strict=True))) if by_name else exact(*grids)
+        except TypeError as error:
+            hint = "it is given numpy arrays: use np.sin instead of math.sin, and np.where instead of if"
+            raise refused("exact", "a function", f"raised TypeError ({error})", hint) from error
 
     nodes, weights = np.polynomial.legendre.leggauss(GAUSS)
     points = []

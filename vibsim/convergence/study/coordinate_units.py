@@ -43,7 +43,8 @@ def in_common_units(levels: Sequence[GridValues]) -> list[GridValues]:
     first, converted = levels[0], []
     for i, level in enumerate(levels):
         if first.units and level.units and level.units != first.units:
-            raise _other_units(i, level.name or "values", level.units, first.units)
+            name = level.name or "values"
+            raise _other_units(level.place(i), name, level.units, first.units)
         coords = dict(level.coords)
         for dim, unit in level.units_of_coords.items():
             common_unit = first.units_of_coords.get(dim, unit)
@@ -51,7 +52,7 @@ def in_common_units(levels: Sequence[GridValues]) -> list[GridValues]:
                 continue
             change = _change(unit, common_unit)
             if change is None:
-                raise _other_units(i, dim, *map(_described, (unit, common_unit)))
+                raise _other_units(level.place(i), dim, *map(_described, (unit, common_unit)))
             factor, shift = change
             coords[dim] = np.asarray(coords[dim], dtype=np.float64) * factor + shift
         converted.append(replace(level, coords=coords))
@@ -95,8 +96,6 @@ def _described(unit: tuple[str, str]) -> str:
     return f"{unit[0]} (calendar {unit[1]})" if SINCE in unit[0] else unit[0]
 
 
-def _other_units(level: int, name: str, units: str, coarsest: str) -> Exception:
+def _other_units(place: str, name: str, units: str, coarsest: str) -> Exception:
     rule = f"has the unit {units}, the coarsest level has {coarsest}"
-    return refused(
-        f"level {level} (from the coarsest)", name, rule, "give all levels the same units"
-    )
+    return refused(place, name, rule, "give all levels the same units")

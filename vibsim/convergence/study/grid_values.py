@@ -35,6 +35,14 @@ class GridValues:
     """Unit (empty if there is none) and calendar of each coordinate."""
     written: Decimal | None = None
     """A number with the digits that it was written with."""
+    spacing: float = 0.0
+    """Distance of neighbouring values if these were packed into integers; else 0."""
+    file: str = ""
+    """The file that the values come from, for messages."""
+
+    def place(self, level: int) -> str:
+        """Name the file, or else the position of the level from the coarsest one, from 0."""
+        return self.file or f"level {level} (from the coarsest)"
 
 
 def grid_values(value: Any, key: str) -> GridValues:
@@ -70,6 +78,7 @@ def grid_values(value: Any, key: str) -> GridValues:
             epsilon,
             units_in(getattr(value, "attrs", {}))[0],
             {name: units_in(axes[name].attrs) for name in coords},
+            spacing=spacing_in(getattr(value, "encoding", {})),
         )
     if hasattr(value, "iloc"):
         hint = "its index is a coordinate in value.to_xarray(), and left out in value.to_numpy()"
@@ -88,6 +97,17 @@ def units_in(attributes: Mapping[Any, Any]) -> tuple[str, str]:
     return ("" if unit == NO_UNIT else unit), str(attributes.get("calendar", "standard"))
 
 
+def spacing_in(packing: Mapping[Any, Any]) -> float:
+    """Return the distance of neighbouring values of a variable with this ``dtype`` and ``scale_factor`` in its file.
+
+    It is 0 if the file does not hold integers that stand for other numbers.
+    """
+    scale = packing.get("scale_factor")
+    if scale is None or np.dtype(packing.get("dtype", np.float64)).kind not in "iu":
+        return 0.0
+    return abs(float(np.asarray(scale).ravel()[0]))
+
+
 def real(array: NDArray[Any], key: str) -> tuple[Floats, float]:
     """Return an array in double precision, and the machine epsilon of its original precision."""
     if array.dtype.kind == "c":
@@ -95,7 +115,8 @@ def real(array: NDArray[Any], key: str) -> tuple[Floats, float]:
             key, str(array.dtype), "must be real", "judge real and imaginary part separately"
         )
     if array.dtype.kind not in "fiu":
-        raise refused(key, array.dtype.name, "must hold numbers")
+        shown = array.item() if array.size == 1 else f"type {array.dtype.name}"
+        raise refused(key, shown, "must hold numbers")
     if array.size == 0:
         raise refused(key, f"shape {array.shape}", "must not be empty")
     is_float = array.dtype.kind == "f" and array.dtype.itemsize <= 8

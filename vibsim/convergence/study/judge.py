@@ -205,6 +205,7 @@ def verdicts(
     common = common_values(levels, kind, names, fixed)
     half = half_written(exact) if isinstance(exact, Decimal) else None
     written = tuple(level.written for level in levels if level.written is not None)
+    spacings = np.array([level.spacing for level in levels])
     request = Request(
         quantity or levels[0].name or "u",
         order,
@@ -212,6 +213,7 @@ def verdicts(
         noise,
         half,
         written if len(written) == len(levels) else None,
+        spacings if spacings.any() else None,
     )
     exact_array = None if exact is None else exact_values(exact, common, members=members)
     shape, n = common.values.shape[1:], len(steps.h)

@@ -138,15 +138,17 @@ def rounding_of_sizes(h: Floats) -> Floats:
 def step_of_values(values: Floats) -> float:
     """Return the least difference of levels if values come in steps, such as a largest value over grid points; else 0.
 
-    They do if some of the finest `IN_STEPS` levels are equal to the last bit and others differ. Coarser levels count
-    only if all of these are equal. The values are off by about one step. They have the shape (n, points).
+    They do if some of the finest `IN_STEPS` levels are equal to the last bit and others differ by more than round-off.
+    Coarser levels count only if all of these are equal. The values are off by about one step. They have the shape
+    (n, points).
     """
     sizes = np.max(np.abs(np.diff(values, axis=0)), axis=1)
     finest = sizes[1 - IN_STEPS :]
-    if np.all(finest > 0.0) or not np.any(sizes):
+    if np.all(finest > 0.0):
         return 0.0
-    among = finest if np.any(finest) else sizes
-    return float(np.min(among[among > 0.0]))
+    steps = sizes > np.finfo(np.float64).eps * np.max(np.abs(values))
+    among = finest[steps[1 - IN_STEPS :]] if np.any(finest) else sizes[steps]
+    return float(np.min(among, initial=np.inf)) if len(among) else 0.0
 
 
 def is_single(values: Floats) -> bool:

@@ -20,7 +20,12 @@ from vibsim.convergence.study.measurement import (
     step_of_values,
 )
 from vibsim.convergence.study.restriction import polynomials
-from vibsim.convergence.thresholds import LEAST_WITH_LIMIT, MISSED
+from vibsim.convergence.thresholds import (
+    ABOVE_ROUND_OFF,
+    BLOWN_UP,
+    LEAST_WITH_LIMIT,
+    MISSED,
+)
 from vibsim.core.array_types import Flags, Floats, Integers
 from vibsim.core.vocabulary import LEVELS_OF_AN_ORDER, REASON_NAMES
 from vibsim.elementary import on_arrays
@@ -58,11 +63,14 @@ class Request:
     """Half a unit of the last digit of the exact value as written; None if only its value is known."""
     written: tuple[Decimal, ...] | None = None
     """Numbers of all levels with their digits as written."""
+    spacings: Floats | None = None
+    """Distance of neighbouring values of each level that was packed into integers, else 0; None if none was."""
 
     def halves(self, values: Floats, places: Integers, *, of_binary: bool = False) -> Floats:
-        """Return half a unit of the last digit of the levels at `places`; see `half_last_digits`."""
+        """Return half a unit of the last digit of the levels at `places`, decimal or packed; see `half_last_digits`."""
         written = None if self.written is None else [self.written[i] for i in places]
-        return half_last_digits(values, of_binary=of_binary, written=written)
+        halves = half_last_digits(values, of_binary=of_binary, written=written)
+        return halves if self.spacings is None else np.maximum(halves, 0.5 * self.spacings[places])
 
 
 @dataclass
@@ -92,6 +100,8 @@ class Outcome:
     """Positions of the levels that the order rests on."""
     is_contradicted: bool = False
     """Whether finer levels contradict that order."""
+    is_growing: bool = False
+    """Whether levels without an order differ far more at the finest step than before, so that they show no limit."""
     left_out: int = 0
     """Number of finite levels that the verdict leaves out because their step sizes are close to those of others."""
     error: float = np.nan
@@ -369,6 +379,7 @@ def _decide(
     outcome.left_out = len(finite_values) - len(judged_values)
     outcome.low, outcome.high = float(assessment.low[k]), float(assessment.high[k])
     outcome.is_contradicted = bool(assessment.contradicted[k])
+    outcome.is_growing = not outcome.order >= LEAST_WITH_LIMIT and _grow(outcome)
     halves = request.halves(judged_values, places)
     outcome.half = float(halves[-1])
     if np.isfinite(weights).all():
@@ -405,6 +416,9 @@ def _decide(
     outcome.best_bound = bound_of_best + outcome.rounded
     if outcome.exact_known:
         return
+    if outcome.is_growing:
+        outcome.best, outcome.best_bound = None, np.nan
+        return
     outcome.error, outcome.error_bound = (
         float(assessment.error[k]) * scale,
         max(float(assessment.error_bound[k]) * scale, request.noise or 0.0) + outcome.rounded,
@@ -415,6 +429,13 @@ def _decide(
         )
         if outcome.is_number and outcome.errors[outcome.finite[-1]] < 0.0:
             outcome.error = -outcome.error
+
+
+def _grow(outcome: Outcome) -> bool:
+    """Say whether an open ladder has a finest difference far above round-off and every other difference."""
+    sizes = np.abs(outcome.differences)
+    least = max(BLOWN_UP * float(np.max(sizes[:-1])), ABOVE_ROUND_OFF * outcome.floor)
+    return outcome.reason in ("pre_asymptotic", "round_off") and bool(sizes[-1] > least)
 
 
 def _estimate(

@@ -40,6 +40,8 @@ class Setting:
     """Kind and order of the interpolation, if it hides the order."""
     is_contradicted: bool = False
     """Whether levels finer than those of the order contradict it."""
+    is_growing: bool = False
+    """Whether levels without an order differ far more at the finest step than before."""
     are_sizes_rounded: bool = False
     """Whether the rounding of the sizes may change the order by more than the tolerance."""
     notes: tuple[str, ...] = ()
@@ -50,6 +52,8 @@ class Setting:
 
 BEYOND_ROUND_OFF = 1e-10
 """A difference above this part of the values is not round-off."""
+BLOW_UP = 1e3
+"""A finest level this factor larger than every other one may be that of an unstable solver."""
 APART = 1e-3
 """Growing differences above this part of the values mean levels that move apart, unless a noise is stated."""
 LOOK_FOR = (
@@ -103,6 +107,11 @@ SENTENCES: Mapping[str, tuple[str, str]] = MappingProxyType(
             "Check that {size} is a step size, not a number of cells or steps, and that each level has its own. If so, "
             "{finer}.",
         ),
+        "blown_up": (
+            "{quantity} grows towards the finer levels, as with an unstable solver.",
+            "Check the limit of stability of the solver, such as the longest time step for a cell size, and that "
+            "{size} is a step size.",
+        ),
         "round_off": (
             "The finest differences of {quantity} look like {floor}, so they do not show its order{estimate}.",
             "Use coarser levels, or {less_noise}.",
@@ -123,17 +132,17 @@ SENTENCES: Mapping[str, tuple[str, str]] = MappingProxyType(
     }
 )
 """Templates of sentence and advice by the reasons that levels alone show. ``interpolation`` is the only case of
-``not_applicable``; ``rounded`` and ``contradicted`` are cases of ``pre_asymptotic``, and ``growing`` is one of this and
-of ``round_off``."""
+``not_applicable``; ``rounded`` and ``contradicted`` are cases of ``pre_asymptotic``, and ``growing`` and ``blown_up``
+are cases of this and of ``round_off``."""
 
 
 def describe(facts: LadderVerdict, setting: Setting) -> tuple[str, str]:
     """Return sentence and advice on a ladder; the advice is empty if it passed."""
     key = "interpolation" if setting.interpolation else facts.reason
-    if key == "pre_asymptotic" and setting.is_contradicted and facts.order is not None:
+    if _is_growth(facts, setting):
+        key = "blown_up" if _is_blown_up(facts) else "growing"
+    elif key == "pre_asymptotic" and setting.is_contradicted and facts.order is not None:
         key = "contradicted"
-    elif facts.order is not None and round(facts.order, 3) < 0.0 and _is_growth(facts, setting):
-        key = "growing"
     elif key == "pre_asymptotic" and setting.are_digits_few:
         key = "rounded"
     phrases = _phrases(facts, setting)
@@ -144,7 +153,7 @@ def describe(facts: LadderVerdict, setting: Setting) -> tuple[str, str]:
         opposite_part(
             facts.reason, facts.order, facts.expected if facts.at_least is None else facts.at_least
         ),
-        "" if key == "contradicted" else _interval(facts),
+        "" if key in ("contradicted", "blown_up") else _interval(facts),
         _error(facts),
         _best(facts),
         _together(setting),
@@ -162,12 +171,19 @@ def describe(facts: LadderVerdict, setting: Setting) -> tuple[str, str]:
 
 
 def _is_growth(facts: LadderVerdict, setting: Setting) -> bool:
-    """Say whether growing differences mean levels that move apart, and not noise."""
+    """Say whether differences grow because levels move apart, and not because of noise."""
+    if not setting.is_growing and (facts.order is None or round(facts.order, 3) >= 0.0):
+        return False
     if facts.reason != "round_off":
         return facts.reason == "pre_asymptotic"
     finest = facts.levels[-2:][0]
     size = abs(finest.value or 0.0)
     return not setting.is_noise_stated and abs(finest.difference or 0.0) > APART * size > 0.0
+
+
+def _is_blown_up(facts: LadderVerdict) -> bool:
+    *others, finest = (abs(level.value) for level in facts.levels if level.value is not None)
+    return finest > BLOW_UP * max(others)
 
 
 def _joined(parts: Sequence[str]) -> str:
