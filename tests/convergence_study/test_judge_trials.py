@@ -232,6 +232,23 @@ def test_bounds_hold_of_printed_numbers(limit: float, digits: int, order: int) -
     assert "last digit" not in unprinted.sentence
 
 
+def test_bounds_hold_where_rounding_adds_up() -> None:
+    """Simpson's rule for cos(w x) from 0 to 1 with 40 to 2560 intervals, whose sum rounds more than a stored number."""
+    w = np.linspace(2.0, 12.0, 60)
+    counts = [40 * 2**k for k in range(7)]
+
+    def simpson(n: int) -> np.ndarray:
+        weights = np.ones(n + 1)
+        weights[1:-1:2], weights[2:-1:2] = 4.0, 2.0
+        return np.sum(weights * np.cos(w[:, None] * np.arange(n + 1) / n), axis=1) / (3 * n)
+
+    found = judge([1 / n for n in counts], [simpson(n) for n in counts], order=4, members=True)
+    exact = np.sin(w) / w
+    errors = [abs((v.best or 0.0) - value) for v, value in zip(found, exact, strict=True)]
+    missed = [error > (v.best_bound or 0.0) for v, error in zip(found, errors, strict=True)]
+    assert sum(missed) <= 1
+
+
 @pytest.mark.parametrize("value", [0.0, 1.0, 0.25, 65.0, 0.0625, 1.0 / 3.0])
 def test_equal_levels_that_may_be_exact_are_not_taken_for_printed_numbers(value: float) -> None:
     verdict = judge(H, [value] * 4)

@@ -9,7 +9,7 @@ from decimal import Decimal
 import numpy as np
 
 from vibsim.convergence.error_model.ladder import Ladder
-from vibsim.core.array_types import Flags, Floats
+from vibsim.core.array_types import Floats
 
 SINGLE = float(np.finfo(np.float32).eps)
 """Relative spacing of single precision."""
@@ -41,8 +41,8 @@ class Measurement:
     """A power of two for each member, so that squares neither overflow nor vanish, shape (member,)."""
     norms: Floats
     """Root mean square of the values of each level, shape (member, n)."""
-    are_single: Flags
-    """Whether the finest level has single precision, shape (member,)."""
+    epsilon: Floats
+    """Relative spacing of the precision of the finest level, shape (member,)."""
 
 
 def scale_of(values: Floats) -> Floats:
@@ -213,4 +213,4 @@ def measurement(
         numbers=np.full(len(values), points == 1),
         exact_known=exact is not None,
     )
-    return Measurement(ladder, scale, norms * scale[:, None], epsilon[:, -1] >= SINGLE)
+    return Measurement(ladder, scale, norms * scale[:, None], epsilon[:, -1])

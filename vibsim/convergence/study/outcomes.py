@@ -37,9 +37,10 @@ EXACT_DIGITS = 16
 MOST_UNITS = 8.0
 """Largest distance of exact values from the finest level, in half units of its last digit, that rounding explains."""
 MOST_ADDED_UP, ADDED_UP = 100.0, 10.0
-"""Largest and usual accumulated rounding error of a calculation, in units of the precision of the values.
+"""Largest and usual accumulated rounding error of a calculation, in units of the precision of the values [calibrated].
 
-Bounds include the usual one for single precision, where it is often visible beside the error."""
+Bounds include the usual one. On 960 ladders of RK4 and Simpson's rule down to round-off 2 best values miss theirs
+instead of 24, and a tenth of the bounds is more than 1.2 and 4 times as wide."""
 LEAST_RATIO = 1.4
 """Smallest ratio of the step sizes that a verdict rests on; levels closer together are left out [calibrated].
 
@@ -387,9 +388,11 @@ def _decide(
         outcome.best = sum(
             (w * row for w, row in zip(weights, judged_values, strict=True)), 0.0 * judged_values[0]
         )
-        added_up = ADDED_UP * SINGLE * measured.norms[k, -1] * measured.are_single[k]
+        # levels that are the same to the last digit of double precision show no rounding that adds up
+        may_add_up = measured.epsilon[k] >= SINGLE or bool(np.any(np.diff(judged_values, axis=0)))
+        added_up = ADDED_UP * measured.epsilon[k] * measured.norms[k, -1] * may_add_up
         step = step_of_values(judged_values)
-        units = np.maximum(halves, float(added_up))
+        units = np.maximum(halves, added_up)
         # printed values differ by some units of their last digit: these are no steps
         outcome.comes_in_steps = step > 10.0 * float(np.max(units))
         outcome.rounded = float(np.sum(np.maximum(units, step) * np.abs(weights)))
