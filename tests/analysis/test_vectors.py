@@ -151,6 +151,12 @@ def test_a_fault_of_one_coordinate_shows_as_far_as_it_is_a_part_of_the_error(
     assert sound.status == "PASS"
     # other coordinates have the expected order, but it is not a matter of how the vector is computed
     assert facts([vector])[0]["cause"] == "none"
+    names = [f"x{i}" for i in range(1, SIZE + 1)]
+    last = [found[f"{name}_difference_norm"][0, 0, -1] for name in names]
+    norms = np.array(last)[:, found.words("norm").index("l2")]
+    share = 100.0 * norms[1] ** 2 / np.sum(norms**2)
+    sentence = f"x2 has the largest share of the error: {share:.2g} % of its square."
+    assert (sentence in vector.text) == (whole == "order_low")
 
 
 @pytest.mark.parametrize("lean", [False, True])

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import shutil
 import webbrowser
 from pathlib import Path
 
 import pytest
 
 from vibsim.cli import main
+from vibsim.core.home import home
 
 from .conftest import Made
 
@@ -71,6 +73,12 @@ def test_without_a_report_nothing_is_opened(
 ) -> None:
     assert made.vibsim("open", made.file) == 1
     assert f"there is no report yet: .venv/bin/vibsim run {made.file}" in capsys.readouterr().err
+    heat = tmp_path / "heat.yaml"
+    shutil.copytree(home() / "examples" / "heat", tmp_path, dirs_exist_ok=True)
+    assert made.vibsim("open", heat) == 1
+    # its program runs only where it is allowed
+    told = capsys.readouterr().err
+    assert f"there is no report yet: .venv/bin/vibsim run {heat} --allow-commands" in told
     assert main(["open", "--results", str(tmp_path)]) == 1
     assert made.vibsim("open", "theta_convergense") == 2
     assert "did you mean 'theta_convergence'?" in capsys.readouterr().err

@@ -442,8 +442,9 @@ def test_a_row_names_its_number_and_its_member_in_words_with_units():
     card = cards.card(exp, record, summary["checks"][0])
     assert card["what"] == "Largest absolute value of ΔE at g = 1 m s⁻²"
     assert card["wanted"] == "below 9 J"
-    names = ("wire_force", "x_3", "u_left", "theta")
-    assert [words.symbol(name) for name in names] == ["wire force", "x_3", "u_left", "θ"]
+    names = ("wire_force", "x_3", "u_left", "theta", "theta_left")
+    symbols = ["wire force", "x_3", "u_left", "θ", "theta_left"]
+    assert [words.symbol(name) for name in names] == symbols
 
 
 def test_an_order_that_misses_its_promise_says_that_nothing_asks_for_it():
@@ -705,4 +706,4 @@ def test_coordinates_together_have_numbers_and_no_picture_over_time(sweep, names
     report.write(samples.plan(exp), record, summary, tmp_path)
     page = (tmp_path / "report.html").read_text(encoding="utf-8")
     assert "position vector converges at the order that both schemes promise" in page
-    assert "L2 norm of position vector(level) − position vector(next level)" in page
+    assert "position vector: L2 norm of its difference from the next level" in page

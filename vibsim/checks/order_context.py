@@ -18,9 +18,10 @@ from vibsim.checks.sentences import MemberFacts, cost_in_words, growth_in_words
 from vibsim.checks.stable import SAME_TIME, first_within
 from vibsim.comparison.comparison_variables import has_exact
 from vibsim.core.record import Record
-from vibsim.core.vocabulary import POSITION_VECTOR, is_error_part, whole_of
+from vibsim.core.vocabulary import POSITION_VECTOR, TYPICAL_NORM, is_error_part, whole_of
 from vibsim.experiment.schema.checks import ConvergesCheck
 from vibsim.experiment.sweep_columns import recorded_columns
+from vibsim.models.base import components
 from vibsim.observe.member_block import fastest
 from vibsim.schemes.base import LOW_STARTS, Scheme
 
@@ -112,6 +113,17 @@ class OrderContext:
                 place = self._facts.scheme, self._facts.case, i
                 return self._stored(f"{self.quantity}_coincidence", *place)
         return math.nan
+
+    @cached_property
+    def squares(self) -> dict[str, float]:
+        """The squares of the finest differences of all coordinates of a vector; empty for any other quantity."""
+        names = components(self._facts.model, self.quantity)
+        record, norm = self._facts.record, self._facts.record.words("norm").index(TYPICAL_NORM)
+        place = self._facts.scheme, self._facts.case, -1, norm
+        stored = [name for name in names if f"{name}_difference_norm" in record]
+        if len(names) == 1 or len(stored) < len(names):
+            return {}
+        return {name: float(record[f"{name}_difference_norm"][place]) ** 2 for name in names}
 
     @cached_property
     def centred(self) -> float:

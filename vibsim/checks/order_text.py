@@ -41,7 +41,7 @@ def in_words(s: _Phrases) -> Description:
     """Fill the templates of the diagnosis."""
     sentence, advice = DIAGNOSES[_diagnosis(s)]
     if s.reason in ("order_low", "order_high"):
-        sentence = f"{{other_order}}{sentence}{{parts}}{{error}}"
+        sentence = f"{{other_order}}{sentence}{{largest_share}}{{parts}}{{error}}"
     template = Template(s, s.notation)
     return Description(template.format(sentence), template.format(advice))
 
@@ -112,6 +112,15 @@ class _Phrases(OrderContext):
         hidden = opposite_part(self.reason, self.order, self.expected)
         sentence = f"{self.subject} converges {word} than order {expected}{with_order}."
         return f"{sentence} {hidden}".rstrip()
+
+    def largest_share(self) -> str:
+        """Name the coordinate that has the largest share of the error of a vector; empty for other quantities."""
+        if not 0.0 < sum(self.squares.values()) < math.inf:
+            return ""
+        name = max(self.squares, key=self.squares.__getitem__)
+        share = self.notation.number(100.0 * self.squares[name] / sum(self.squares.values()), 2)
+        subject = self.notation.opening(self.notation.quantity(name))
+        return f" {subject} has the largest share of the error: {share} % of its square."
 
     def whose(self) -> str:
         """Say whether the order is promised by the scheme or expected by the check alone."""

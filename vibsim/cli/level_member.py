@@ -11,7 +11,6 @@ from vibsim.cli import outcome_text
 from vibsim.cli.jobs.common import refusal
 from vibsim.core.errors import VibsimError, nearest
 from vibsim.core.home import called
-from vibsim.core.set_option import command_to_run
 from vibsim.plan import Plan, ShardJob
 
 if TYPE_CHECKING:
@@ -54,7 +53,9 @@ def made(plan: Plan, results: Path, case: int, word: str) -> tuple[list[int], li
     levels = [level.level for level in plan.levels]
     existing = [level for level in levels if (results / _shard(plan, level, case).path).is_file()]
     if not existing:
-        problem = f"there are no results yet: {called(command_to_run(word))} (looked in {results})"
+        problem = (
+            f"there are no results yet: {called(plan.command_to_run(word))} (looked in {results})"
+        )
         raise VibsimError(f"{plan.key}: {problem}")
     return levels, existing
 

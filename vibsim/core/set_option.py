@@ -1,4 +1,4 @@
-"""The text of the command-line option ``--set`` in messages, commands and pages."""
+"""The text of commands to run, and of their options, in messages and on pages."""
 
 from __future__ import annotations
 
@@ -6,6 +6,8 @@ from collections.abc import Sequence
 from shlex import quote
 
 OPTION = "--set"
+ALLOW = "--allow-commands"
+"""Option that allows programs of the user to run."""
 
 
 def set_options(settings: Sequence[str]) -> str:
@@ -13,9 +15,9 @@ def set_options(settings: Sequence[str]) -> str:
     return "".join(f" {OPTION} {quote(str(text))}" for text in settings)
 
 
-def command_to_run(word: str, settings: Sequence[str] = ()) -> str:
-    """Return the command that runs the experiment named by `word`."""
-    return f"vibsim run {quote(word)}{set_options(settings)}"
+def command_to_run(word: str, settings: Sequence[str] = (), *, has_program: bool = False) -> str:
+    """Return the command that runs the experiment named by `word`, which may have a program of the user."""
+    return f"vibsim run {quote(word)}{set_options(settings)}{f' {ALLOW}' * has_program}"
 
 
 def set_in(file: str, setting: str) -> str:

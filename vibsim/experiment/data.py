@@ -309,9 +309,14 @@ class ReadExperiment(Section):
             there = "there is 1 member" if members == 1 else f"there are {members} members"
             raise self.refused("", str(case), f"a case must be from 0 to {members - 1}", there)
 
+    @property
+    def has_program(self) -> bool:
+        """Whether a program of the user makes its levels, which the command line must allow."""
+        return False
+
     def command_of(self, case: int) -> str:
         """Return the shell command that runs only member `case` of the sweep."""
-        return command_to_run(f"{self.word}@{case}", self.settings)
+        return command_to_run(f"{self.word}@{case}", self.settings, has_program=self.has_program)
 
 
 class ExperimentSpec(ReadExperiment):

@@ -60,6 +60,11 @@ class SolverExperiment(ReadExperiment):
     checks: tuple[SolverCheck, ...]
 
     @property
+    def has_program(self) -> bool:
+        """Whether a command or a function makes the levels, not files that exist."""
+        return self.solver.kind != "files"
+
+    @property
     def step(self) -> str:
         """Name of the step size."""
         return next(iter(self.sizes))

@@ -15,6 +15,7 @@ from types import UnionType
 from typing import TYPE_CHECKING, Any, get_args, get_origin, get_type_hints
 
 from vibsim.core.errors import Fault
+from vibsim.core.set_option import command_to_run
 from vibsim.experiment.collection import ENDINGS
 
 if TYPE_CHECKING:
@@ -152,6 +153,10 @@ class Plan:
         """The user's command or function that the jobs run; empty if they run none."""
         solver = self.content.get("solver", {})
         return "" if solver.get("kind", "files") == "files" else str(solver["text"])
+
+    def command_to_run(self, word: str) -> str:
+        """Return the command that runs the experiment, which `word` names on a command line."""
+        return command_to_run(word, has_program=bool(self.command))
 
     @property
     def key(self) -> str:

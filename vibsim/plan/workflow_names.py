@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from vibsim.core.processes import usable_cores
-from vibsim.core.set_option import OPTION
+from vibsim.core.set_option import ALLOW, OPTION
 from vibsim.plan import code_digest
 from vibsim.plan.digests import digest_of
 from vibsim.plan.jobs import Batch, Plan
@@ -149,7 +149,7 @@ class Names:
 
     def level_flags(self, wildcards: Any, input: Any) -> str:  # noqa: A002
         """Return further options of jobs that make levels; Snakemake does not compare them, see `file`."""
-        return "--allow-commands" if self.allows_commands else ""
+        return ALLOW if self.allows_commands else ""
 
     def setting_flags(self, wildcards: Any, input: Any) -> list[str]:  # noqa: A002
         """Return the options that pass the settings to every job; Snakemake does not compare them, see `file`."""

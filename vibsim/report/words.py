@@ -33,6 +33,12 @@ NAMES = {
 }
 """Quantity to its letter and its words; other quantities go by their name."""
 
+LETTERS = {
+    "alpha": "α", "beta": "β", "gamma": "γ", "delta": "δ", "epsilon": "ε", "zeta": "ζ", "eta": "η", "theta": "θ",
+    "kappa": "κ", "lambda": "λ", "mu": "μ", "nu": "ν", "rho": "ρ", "sigma": "σ", "tau": "τ", "phi": "φ", "psi": "ψ",
+    "omega": "ω",
+}  # fmt: skip
+"""Name to its Greek letter; other names stay as they are."""
 PARTS = {PHASE: ("φ({})", "phase error of {}"), AMPLITUDE: ("a({})", "amplitude error of {}")}
 """Suffix of a part of a position's error to its letter and its words."""
 
@@ -72,8 +78,9 @@ def _named(quantity: str) -> tuple[str, str]:
 
 
 def is_phrase(name: str) -> bool:
-    """Return whether a name has several words, unlike a letter with an index such as ``x_3`` or ``u_left``."""
-    return re.fullmatch(r"[^\W\d_]{2,}(_[^\W\d_]{2,})+", name) is not None
+    """Return whether a name has several words, unlike a letter with an index: ``x_3``, ``u_left``, ``theta_left``."""
+    is_letter = name.partition("_")[0] in LETTERS
+    return not is_letter and re.fullmatch(r"[^\W\d_]{2,}(_[^\W\d_]{2,})+", name) is not None
 
 
 def symbol(quantity: str) -> str:

@@ -155,10 +155,9 @@ def _result(experiment: SolverExperiment, result: SolverResult) -> dict[str, Any
     }
     if experiment.sweep is None:
         return fields
-    flag = "" if experiment.solver.kind == "files" else " --allow-commands"
     return fields | {
         "values": experiment.parameters_of(result.member),
-        "command": experiment.command_of(result.member) + flag,
+        "command": experiment.command_of(result.member),
     }
 
 

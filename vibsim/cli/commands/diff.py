@@ -14,7 +14,6 @@ from vibsim.cli.level_member import are_outdated, summary_of
 from vibsim.cli.setting_changes import Change, differences
 from vibsim.cli.terminal import clean, painted
 from vibsim.core.home import called
-from vibsim.core.set_option import command_to_run
 from vibsim.plan.digests import analysed
 from vibsim.store import read_json
 
@@ -31,6 +30,8 @@ class Side(NamedTuple):
     title: str
     summary: Mapping[str, Any] | None
     """Its verdicts; None if there are none for these settings."""
+    command: str = ""
+    """The command that makes them."""
 
 
 def diff(options: Namespace) -> int:
@@ -38,7 +39,7 @@ def diff(options: Namespace) -> int:
     results = chosen_results(options)
     words = (options.first, options.second)
     first, second = sides = [_side(word, results) for word in words]
-    missing = [word for word, side in zip(words, sides, strict=True) if side.summary is None]
+    missing = [pair for pair in zip(words, sides, strict=True) if pair[1].summary is None]
     changes = differences(*({"title": side.title} for side in sides))
     parts = {"settings": changes + differences(first.content, second.content)}
     if first.summary is not None and second.summary is not None:
@@ -49,10 +50,8 @@ def diff(options: Namespace) -> int:
         if changes:
             print(painted(name, "bold"))
             print(*(f"  {change}" for change in changes), sep="\n")
-    for word in missing:
-        print(
-            f"{word}: there are no verdicts of these settings yet: {called(command_to_run(word))}"
-        )
+    for word, side in missing:
+        print(f"{word}: there are no verdicts of these settings yet: {called(side.command)}")
     if any(parts.values()):
         return 1
     if not missing:
@@ -77,7 +76,7 @@ def _side(word: str, results: Path) -> Side:
     current = summary_of(plan, results)
     if current is not None and are_outdated(plan, current):
         current = None
-    return Side(analysed(plan.content), plan.title, current)
+    return Side(analysed(plan.content), plan.title, current, plan.command_to_run(word))
 
 
 Pair = tuple[str, Mapping[str, Any] | None, Mapping[str, Any] | None]

@@ -11,7 +11,6 @@ from vibsim.cli.jobs.common import chosen_results
 from vibsim.cli.level_member import OUTDATED, are_outdated, summary_of
 from vibsim.core.errors import VibsimError
 from vibsim.core.home import called
-from vibsim.core.set_option import command_to_run
 
 
 def open_(options: Namespace) -> int:
@@ -24,7 +23,7 @@ def open_(options: Namespace) -> int:
     plan = None if word is None else one_plan_of(word)
     page = results / ("index.html" if plan is None else plan.page)
     if not page.is_file():
-        command = called("vibsim run" if word is None else command_to_run(word))
+        command = called("vibsim run" if plan is None else plan.command_to_run(str(word)))
         raise VibsimError(f"{page}: there is no report yet: {command}")
     if plan is not None:
         summary = summary_of(plan, results)

@@ -24,7 +24,6 @@ from vibsim.cli.jobs.common import one_plan, read_all, refusal
 from vibsim.core import regular_files
 from vibsim.core.errors import VibsimError
 from vibsim.core.home import called
-from vibsim.core.set_option import command_to_run
 from vibsim.plan import Plan
 from vibsim.store.reading import read_provenance
 
@@ -64,7 +63,7 @@ def _check(plan: Plan, options: Namespace, results: Path) -> None:
     _, problems = verify.compare(results, plan.key)
     if problems:
         text = "\n".join(f"{path}: {problem}" for path, problem in problems.items())
-        command = called(command_to_run(str(plan.file)))
+        command = called(plan.command_to_run(str(plan.file)))
         raise VibsimError(f"{text}\nonly whole results are published: {command}")
     current: dict[str, Callable[[Path], Any]] = {
         shard.path: partial(store.check, digest=shard.digest) for shard in plan.shards
@@ -135,7 +134,7 @@ def metadata(
         {
             "@id": "#run",
             "@type": "CreateAction",
-            "name": f"vibsim run {plan.name}",
+            "name": plan.command_to_run(plan.name),
             "instrument": {"@id": "#vibsim"},
             "object": _references(inputs),
             "result": _references(name for name in files if name not in inputs),

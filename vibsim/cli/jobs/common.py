@@ -20,7 +20,7 @@ from vibsim.cli import made_files, results_folder
 from vibsim.cli.chosen_plans import one_plan_of
 from vibsim.core.errors import Fault, FileError, InputError, VibsimError
 from vibsim.core.home import default_results
-from vibsim.core.set_option import OPTION
+from vibsim.core.set_option import ALLOW, OPTION
 from vibsim.plan import Plan
 
 if TYPE_CHECKING:
@@ -77,7 +77,7 @@ def run_command(options: Namespace, experiments: Sequence[str], results: Path | 
     words += ["--results", str(results)] if results else []
     words += ["--cores", str(options.cores)] if options.cores else []
     words += [word for text in options.settings for word in (OPTION, text)]
-    return words + ["--allow-commands"] * options.allow_commands
+    return words + [ALLOW] * options.allow_commands
 
 
 @contextmanager

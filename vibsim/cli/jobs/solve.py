@@ -9,17 +9,18 @@ from pathlib import Path
 from vibsim.cli.failure import sentence
 from vibsim.cli.jobs.common import provenance, titled
 from vibsim.core.errors import Fault, InputError, VibsimError
+from vibsim.core.set_option import ALLOW
 from vibsim.plan import Plan, ShardJob
 from vibsim.plan.digests import solved
-
-FLAG = "--allow-commands"
 
 
 def check_allowed(plans: Iterable[Plan], allowed: bool) -> None:
     """Refuse all commands and functions of experiment files unless the command line allows them."""
     rule = "a program of the user runs only where it is allowed"
     faults = [
-        Fault(plan.file, 0, "solver", plan.command, rule, f"run with {FLAG} if you trust this file")
+        Fault(
+            plan.file, 0, "solver", plan.command, rule, f"run with {ALLOW} if you trust this file"
+        )
         for plan in plans
         if plan.command and not allowed
     ]

@@ -89,7 +89,8 @@ def orders(
         (Column("floor", measure, "norm"), lambda member, i: float(floors[member][i])),
         (Column("counts"), lambda member, i: notes[member][i]) if triples else None,
     )
-    caption = f"{letter}: {words.NORMS[norm]} of {f'{letter}(level) − {letter}(next level)' if pairs else 'its error'}"
+    what = "difference from the next level" if pairs else "error"
+    caption = f"{letter}: {words.NORMS[norm]} of its {what}"
     caption += "; ratio and order from three levels starting here" if triples else ""
     return by_level(record, f"orders_{quantity}_{norm}", caption, shown, filled)
 

@@ -4,12 +4,8 @@ from __future__ import annotations
 
 import re
 
-LETTERS = {
-    "alpha": "α", "beta": "β", "gamma": "γ", "delta": "δ", "epsilon": "ε", "zeta": "ζ", "eta": "η", "theta": "θ",
-    "kappa": "κ", "lambda": "λ", "mu": "μ", "nu": "ν", "rho": "ρ", "sigma": "σ", "tau": "τ", "phi": "φ", "psi": "ψ",
-    "omega": "ω",
-}  # fmt: skip
-"""Name to its Greek letter; other names stay as they are."""
+from vibsim.report.words import LETTERS
+
 _TOKEN = re.compile(
     r"(?P<name>[A-Za-z]\w*)(?P<primes>'*)|(?P<number>\d+(?:\.\d+)?(?:e-?\d+)?)|(?P<space>\s+)|(?P<sign>->|\*\*|.)"
 )
