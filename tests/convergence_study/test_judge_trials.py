@@ -606,5 +606,5 @@ def test_coordinates_that_number_the_points_are_told_of(kind: str) -> None:
 
 def test_an_exact_function_that_takes_no_arrays_is_told_how_it_is_called() -> None:
     levels = on_grids([10, 20, 40], 2.0)
-    with pytest.raises(InputError, match="raised TypeError .* use np.sin instead of math.sin"):
+    with pytest.raises(InputError, match=r"raised TypeError .* use np.sin instead of math.sin"):
         judge([0.1, 0.05, 0.025], levels, exact=lambda x: math.sin(math.pi * x))
