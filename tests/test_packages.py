@@ -246,6 +246,7 @@ FAULTY = {
     "another name": ("models", "mine", "other:MODEL", "its kind is 'theirs'"),
     "taken": ("schemes", "rk4", "other:SCHEME", "vibsim has one of this name already"),
     "no frequency": ("models", "mine", "other:STILL", "its natural_frequency gives no number"),
+    "no exact motion": ("models", "mine", "other:WRONG", "its exact(t, initial, parameters)"),
     "no velocity": ("schemes", "mine", "other:ALONE", "its step must return the next state, as"),
     "unusable": ("schemes", "mine", "other:UNUSABLE", "cannot be used: KeyError"),
 }
@@ -263,6 +264,7 @@ def offered(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Place]:
         "MODEL = replace(MODELS['spring'], kind='theirs')\n"
         "SCHEME = replace(SCHEMES['rk2'], kind='mine')\n"
         "STILL = replace(MODEL, kind='mine', natural_frequency=lambda p: p['k'])\n"
+        "WRONG = replace(MODEL, kind='mine', exact=lambda t, initial, parameters: {'u': t})\n"
         "STEPPER = SCHEME.stepper({})\n"
         "STEPPER = replace(STEPPER, step=lambda state, t, dt, p: state)\n"
         "ALONE = replace(SCHEME, stepper=lambda options: STEPPER)\n"

@@ -312,6 +312,9 @@ def fault_of(model: Model) -> str:
         np.asarray(model.natural_frequency(defaults), dtype=float)
     except Exception as error:
         return f"its natural_frequency gives no number at its defaults: {type(error).__name__}: {error}"
+    # one that is written from a file is not complete yet
+    if model.written is None and (fault := _fault_of_exact(model, defaults)):
+        return fault
     # models that may take its place in an experiment
     made = {
         "named": model.named and model.named(model.positions),
@@ -321,6 +324,23 @@ def fault_of(model: Model) -> str:
     for name, other in made.items():
         if other is not None and other.kind != model.kind:
             return f"its {name} makes a model of another kind, {other.kind}: leave it out, or write one"
+    return ""
+
+
+def _fault_of_exact(model: Model, parameters: Numbers) -> str:
+    """Return why the exact motion or period of a model cannot be calculated at these parameters; empty if it can."""
+    initial = {state.name: 1.0 for state in model.states}
+    try:
+        if model.exact is not None:
+            known = model.exact(np.array([0.0, 0.1]), initial, parameters)
+            missing = [name for name in initial if name not in known]
+            if missing:
+                return f"its exact(t, initial, parameters) returns no {missing[0]}"
+        if model.exact_period is not None:
+            np.asarray(model.exact_period(initial, parameters), dtype=float)
+    except Exception as error:
+        rule = "its exact(t, initial, parameters) or exact_period(initial, parameters) fails"
+        return f"{rule} at its defaults: {type(error).__name__}: {error}"
     return ""
 
 
