@@ -100,6 +100,7 @@ def _fps(options: Namespace, form: str) -> float:
 
 def _film(plan: Plan, options: Namespace, form: str) -> Film:
     """Return the film of the chosen runs; by default the finest level, and a coarse run if it differs visibly."""
+    from vibsim.report.data import Results
     from vibsim.report.movie import film
 
     if plan.has_solver:
@@ -127,7 +128,7 @@ def _film(plan: Plan, options: Namespace, form: str) -> Film:
     quantity = chosen("--quantity", wanted, names)
 
     def run(level: int, scheme: str) -> Run:
-        return film.run(plan.experiment, records[level], scheme, quantity)
+        return film.run(Results.of(plan.experiment, records[level]), scheme, quantity)
 
     runs = [run(*pair) for pair in _pairs(wanted_levels, schemes)]
     if not (options.level or options.scheme) and len(made) > 1:
@@ -140,7 +141,7 @@ def _film(plan: Plan, options: Namespace, form: str) -> Film:
         print(level_member.OUTDATED, file=sys.stderr)
     most = min(film.MOST_FRAMES, MOST_GIF_FRAMES // 2) if form == "gif" else film.MOST_FRAMES
     return film.film(
-        plan.experiment, record, runs, quantity, fps=_fps(options, form), frames=options.frames, start=options.start,
+        Results.of(plan.experiment, record), runs, quantity, fps=_fps(options, form), frames=options.frames, start=options.start,
         end=options.end, periods=options.window, most=most,
     )  # fmt: skip
 

@@ -10,19 +10,18 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from vibsim.checks.number_units import unit_of
 from vibsim.core.array_types import Floats
-from vibsim.core.record import Record
 from vibsim.core.vocabulary import SEVERITY
-from vibsim.report import data, finest_level, frame, style, sweep_layout, words
-from vibsim.report.choice import position, promises
+from vibsim.report import finest_level, frame, style, sweep_layout, words
+from vibsim.report.choice import promises
+from vibsim.report.data import Results
 from vibsim.report.figures.panels import explosive, move_label_left, stacked
 from vibsim.report.figures.sweeps import separatrix, view
 from vibsim.report.figures.sweeps.view import View, Worst
 from vibsim.report.finest_level import Measured
 from vibsim.report.style import Picture
 from vibsim.report.sweep_layout import FEWEST_OF_A_LINE, Along
-from vibsim.report.types import Axes, Experiment, ValueCheck
+from vibsim.report.types import Axes, ValueCheck
 
 TALL, ENTRY = 3.0, 0.18  # least height of a panel, height of a legend entry [inch]
 RISE = 0.17  # vertical offset of a verdict from the next better one
@@ -33,19 +32,19 @@ LOG_RATIO = 10.0
 
 
 def views(
-    experiment: Experiment, record: Record, along: Along, quantities: list[str], worst: Worst
+    record: Results, along: Along, quantities: list[str], worst: Worst
 ) -> Iterator[View | str]:
     """Yield a view of each number along one key, or a sentence if all members share it."""
-    draw = _Drawing(experiment, record, along, worst)
+    draw = _Drawing(record, along, worst)
     both = [draw.period, draw.amplitude]
-    for draw_one in both if experiment.model.definition.conservative else both[::-1]:
+    for draw_one in both if record.model.conservative else both[::-1]:
         yield from draw_one()
     for quantity in quantities:
-        if data.whole(record, "triple"):
+        if record.triples:
             yield from draw.order(quantity)
         yield from draw.error(quantity)
         yield from draw.verdict(quantity)
-    for name, text, check in view.value_checks(experiment):
+    for name, text, check in view.value_checks(record):
         yield from draw.number(name, text, check)
 
 
@@ -53,16 +52,17 @@ def views(
 class _Drawing:
     """Views along one key."""
 
-    experiment: Experiment
-    record: Record
+    record: Results
     along: Along
     worst: Worst
 
     @cached_property
     def on_separatrix(self) -> list[float]:
         """Where the separatrix crosses the line of the members, if there is only one line."""
-        is_alone = len(self.along.lines) == 1 and not self.along.follows
-        return separatrix.on_line(self.experiment, self.along.key).tolist() if is_alone else []
+        if len(self.along.lines) > 1 or self.along.follows:
+            return []
+        places: list[float] = separatrix.on_line(self.record.experiment, self.along.key).tolist()
+        return places
 
     def _view(
         self, stem: str, name: str, quantity: str, values: Floats, caption: str, draw: Callable[[Axes], str],
@@ -75,7 +75,7 @@ class _Drawing:
         if text := view.shared(name, values, unit, form):
             yield text
         elif np.isfinite(values).any():
-            tall = max(TALL, ENTRY * len(self.record["scheme"]) * len(self.along.lines))
+            tall = max(TALL, ENTRY * len(self.record.schemes) * len(self.along.lines))
             (ax,) = stacked([tall])
             caption = style.sentences(caption, draw(ax))
             yield self._finished(ax, stem, name, caption, quantity, values, values, unit)
@@ -92,9 +92,7 @@ class _Drawing:
         dotted = "Dotted: the separatrix, where the exact period is infinite."
         marked = dotted * bool(self.on_separatrix)
         ax.set_gid(style.MEMBER)
-        is_ringed = view.ring(
-            ax, float(key.values[worst.case]), float(places[worst.scheme, worst.case])
-        )
+        is_ringed = view.ring(ax, float(key.values[worst.case]), float(places[worst.place]))
         title = words.capitalized(name)
         alt = f"{title} of every member against {key.name}"
         keys = [swept.key for swept in sweep_layout.keys(self.record)]
@@ -106,12 +104,11 @@ class _Drawing:
 
     def period(self) -> Iterator[View | str]:
         """Yield the period with its error bar, and its relative error on several levels."""
-        record, along, quantity = self.record, self.along, position(self.experiment)
-        period = finest_level.measured(record, "period", quantity)
-        exact = data.exact_periods(record)
+        record, along, quantity = self.record, self.along, self.record.model.position
+        period, exact = finest_level.measured(record, "period"), record.exact_periods
         if not np.isfinite(period.value).any():
             return
-        is_known, several = bool(np.isfinite(exact).any()), bool(data.whole(record, "pair"))
+        is_known, several = bool(np.isfinite(exact).any()), bool(record.pairs)
         bars = ", with its error bar from the two finest levels" * several
         yield from self._view(
             "period", "period", quantity, period.value, f"On the finest level{bars}{'; and the exact one' * is_known}.",
@@ -129,8 +126,8 @@ class _Drawing:
 
     def amplitude(self) -> Iterator[View | str]:
         """Yield the amplitude with its error bar."""
-        record, along, quantity = self.record, self.along, position(self.experiment)
-        amplitude = finest_level.measured(record, "amplitude", quantity)
+        record, along, quantity = self.record, self.along, self.record.model.position
+        amplitude = finest_level.measured(record, "amplitude")
         if not np.isfinite(amplitude.value).any():
             return
         size = frame.sizes(record, quantity)
@@ -156,41 +153,38 @@ class _Drawing:
             style.label_values(ax, amplitude.name, amplitude.unit)
             return _leaving(ax, along, amplitude.value)
 
-        explanation = (
-            "Half the height between the last peak and the last trough, on the finest level."
-        )
-        turns = bool(self.experiment.model.definition.turn)
-        explanation += " Members that go over the top have none." * turns
-        open_members = finest_level.unsettled(record, quantity)
+        text = "Half the height between the last peak and the last trough, on the finest level."
+        text += " Members that go over the top have none." * bool(record.model.turn)
+        open_members = finest_level.unsettled(record)
         if count := int(open_members.sum()):
             runs = f"{words.number(count, 'integer')} of {open_members.size} runs"
-            explanation += f" {runs} are not settled: {finest_level.SWINGS}."
+            text += f" {runs} are not settled: {finest_level.SWINGS}."
         yield from self._view(
-            "amplitude", "amplitude", quantity, amplitude.value, explanation, draw, amplitude.unit
+            "amplitude", "amplitude", quantity, amplitude.value, text, draw, amplitude.unit
         )
 
     def order(self, quantity: str) -> Iterator[View | str]:
         """Yield the stated order of every member with its interval."""
         record, along, letter = self.record, self.along, words.symbol(quantity)
-        value, low, high = data.stated_orders(record, quantity)
-        basis = data.basis_of_order(record, quantity)
+        value, low, high = record.stated_orders(quantity)
+        basis = record.basis_of_order(quantity)
 
         def draw(ax: Axes) -> str:
-            promised = promises(self.experiment, record, quantity)
+            promised = promises(record, quantity)
             for order, tolerance in promised:
                 ax.axhspan(order - tolerance, order + tolerance, **style.ALLOWED)
                 ax.axhline(order, **style.REFERENCE, label=f"{basis}, {order:g} ± {tolerance:g}")
             for curve in _curves(record, along):
                 look = style.look(curve.number) | {"markersize": 4, "linewidth": 0.8}
                 _interval(ax, curve.x, curve.of(low), curve.of(high), look["color"])
-                label = curve.text or style.entry(record.words("scheme")[curve.scheme])
+                label = curve.text or style.entry(record.schemes[curve.scheme])
                 _line(ax, curve.x, curve.of(value), label=label, **look)
             if promised:
                 least, most = promised[0][0], promised[-1][0]
                 bottom, top = style.limits(value, np.array([least - 0.25, most + 0.25]))
                 ax.set_ylim(max(bottom, least - 3), min(top, most + 2))
             ax.set_ylabel(f"order of {letter} ({words.USUAL_NORM})")
-            _beside(ax, along, fontsize=7.5 if style.crowded(record) else 8.5)
+            _beside(ax, along, fontsize=7.5 if record.is_crowded else 8.5)
             return ""
 
         yield from self._view(
@@ -202,7 +196,7 @@ class _Drawing:
     def error(self, quantity: str) -> Iterator[View | str]:
         """Yield the error of every member at the finest level."""
         record, along, name = self.record, self.along, f"error of {words.symbol(quantity)}"
-        error, unit = finest_level.error(record, quantity), data.norm_unit(record, quantity)
+        error, unit = finest_level.error(record, quantity), record.norm_unit(quantity)
 
         def draw(ax: Axes) -> str:
             both = np.stack([error.true, error.estimate])
@@ -224,7 +218,7 @@ class _Drawing:
                     dots = look | {"linestyle": "none", "markersize": 4, "markerfacecolor": "white"}
                     _line(ax, x, curve.of(true), label=text, **dots)
             ax.set_ylabel(style.label(f"{name} ({words.USUAL_NORM})", unit))
-            if not style.crowded(record):
+            if not record.is_crowded:
                 _beside(ax, along)
             # without bounded values all of them set the range
             fitted = any(
@@ -233,31 +227,27 @@ class _Drawing:
             )
             return _leaving(ax, along, error.best) if fitted else ""
 
-        explanation = "At the finest level, estimated from two levels"
+        text = ", estimated from two levels"
         if error.kind == "true":
-            explanation = (
-                "At the finest level: true (dots), and what two levels alone say of it (lines)"
-            )
-        has_pairs = bool(data.whole(record, "pair"))
-        explanation = (
-            f"{explanation}, with the interval of the order." if has_pairs else "The true error."
-        )
+            text = ": true (dots), and what two levels alone say of it (lines)"
+        text = f"At the finest level{text}, with the interval of the order."
         yield from self._view(
-            f"sweep_error_{quantity}", name, quantity, error.best, explanation, draw, unit, "norm"
-        )
+            f"sweep_error_{quantity}", name, quantity, error.best, text if record.pairs else "The true error.", draw,
+            unit, "norm",
+        )  # fmt: skip
 
     def verdict(self, quantity: str) -> Iterator[View | str]:
         """Yield the verdict on every member's order, one row per scheme."""
         name = f"verdict on {words.title(quantity)}"
         if f"{quantity}_status" not in self.record:
             return
-        status = data.flags(self.record, f"{quantity}_status")
+        status = self.record.flags(f"{quantity}_status")
         if text := view.shared_verdict(self.record, quantity):
             yield text
             return
-        row = 0.17 if style.crowded(self.record) else 0.3
+        row = 0.17 if self.record.is_crowded else 0.3
         (ax,) = stacked([row * max(2, len(status))])
-        _draw_verdicts(ax, self.along, status, self.record.words("scheme"))
+        _draw_verdicts(ax, self.along, status, self.record.schemes)
         ranks = list(SEVERITY)
         rank = np.array([[ranks.index(word) for word in of_scheme] for of_scheme in status])
         places = np.arange(len(status))[:, None] + RISE * rank
@@ -265,11 +255,10 @@ class _Drawing:
 
     def number(self, name: str, text: str, check: ValueCheck) -> Iterator[View | str]:
         """Yield the number, `text` in words, that a check asks for of every member."""
-        values = view.of_check(self.record, name, check)
-        unit = data.pretty_unit(unit_of(self.experiment, self.record, check))
+        values, unit = view.of_check(self.record, name, check), self.record.unit_of_number(check)
         number = Measured(text, unit, values, np.full(values.shape, np.nan))
         yield from self._view(
-            f"sweep_check_{name}", text, position(self.experiment), values, "",
+            f"sweep_check_{name}", text, self.record.model.position, values, "",
             lambda ax: _draw_numbers(ax, self.record, self.along, number, None, words.capitalized(text)), unit,
         )  # fmt: skip
 
@@ -290,9 +279,9 @@ class _Curve:
         return np.asarray(values[self.scheme, self.members])
 
 
-def _curves(record: Record, along: Along, *, by_line: bool = False) -> list[_Curve]:
+def _curves(record: Results, along: Along, *, by_line: bool = False) -> list[_Curve]:
     """Return the curves of every scheme and line, ordered by scheme, or `by_line`."""
-    names, count = record.words("scheme"), len(along.lines)
+    names, count = record.schemes, len(along.lines)
     curves = []
     for s, name in enumerate(names):
         scheme = name if len(names) > 1 else ""
@@ -328,7 +317,7 @@ def _draw_verdicts(ax: Axes, along: Along, status: NDArray[Any], schemes: list[s
 
 
 def _draw_numbers(
-    ax: Axes, record: Record, along: Along, number: Measured, exact: Floats | None, title: str = ""
+    ax: Axes, record: Results, along: Along, number: Measured, exact: Floats | None, title: str = ""
 ) -> str:
     """Draw a number of the finest level with its error bars, and the exact number if it is known."""
     _draw_bars(ax, record, along, number, exact, title)
@@ -338,10 +327,10 @@ def _draw_numbers(
 
 
 def _draw_bars(
-    ax: Axes, record: Record, along: Along, number: Measured, exact: Floats | None, title: str = ""
+    ax: Axes, record: Results, along: Along, number: Measured, exact: Floats | None, title: str = ""
 ) -> None:
     """Draw the same without limits and label of the vertical axis."""
-    count, level = len(record["scheme"]), data.whole(record, "level")[-1]
+    count, level = len(record.schemes), record.levels[-1]
     for curve in _curves(record, along, by_line=True):
         if exact is not None and curve.scheme == 0:
             values = np.where(np.isfinite(exact), exact, np.nan)[curve.members]
@@ -356,7 +345,7 @@ def _draw_bars(
         text = curve.text or f"level {level}"
         _line(ax, curve.x, value, linestyle=dashes, linewidth=1.0, label=text, **look)
     ax.set_title(title or f"{number.name.capitalize()}, level {level}")
-    _beside(ax, along, fontsize=7.5 if style.crowded(record) else 8)
+    _beside(ax, along, fontsize=7.5 if record.is_crowded else 8)
 
 
 def _room(number: Measured, exact: Floats | None) -> tuple[float, float]:
@@ -368,10 +357,10 @@ def _room(number: Measured, exact: Floats | None) -> tuple[float, float]:
     return style.limits(*(shown if exact is None else [*shown, exact]))
 
 
-def _draw_period_errors(ax: Axes, record: Record, along: Along, period: Measured) -> str:
+def _draw_period_errors(ax: Axes, record: Results, along: Along, period: Measured) -> str:
     """Draw the relative error of the period on several levels, and its estimate from the two finest."""
-    levels, schemes = data.whole(record, "level"), len(record["scheme"])
-    several = len(along.lines) > 1 or style.crowded(record)
+    levels, schemes = record.levels, len(record.schemes)
+    several = len(along.lines) > 1 or record.is_crowded
     count = 1 if several else 6 if schemes == 1 else 3
     spaced = np.linspace(len(levels) - 1, 0, min(len(levels), count)).round().astype(int)
     error = {i: finest_level.period_error(record, i) for i in np.unique(spaced)[::-1].tolist()}
@@ -390,7 +379,7 @@ def _draw_period_errors(ax: Axes, record: Record, along: Along, period: Measured
             _line(ax, curve.x, curve.of(style.no_zeros(level_error)), label=text, **look)
     style.fit_log_axis(ax, "y", *error.values(), room=2.0)
     ax.set(ylabel="|period / exact − 1|", title="Relative error of the period")
-    if not style.crowded(record):
+    if not record.is_crowded:
         _beside(ax, along, fontsize=8)
     return ""
 
