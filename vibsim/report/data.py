@@ -399,11 +399,8 @@ class Ladder:
 
     def optional(self, field: str, dims: tuple[str, ...], norm: str = TYPICAL_NORM) -> Floats:
         """Return the same, or NaN of shape `dims` if the record lacks it."""
-        return (
-            self.at(field, norm)
-            if field in self
-            else np.full([self.record.sizes[d] for d in dims], np.nan)
-        )
+        name, place = f"{self.quantity}_{field}", self.member
+        return self.record.optional(name, dims, norm, scheme=place.scheme, case=place.case)
 
     def unit(self, field: str = "finest") -> str:
         """Return the unit of a variable of the quantity; empty if it has none."""
