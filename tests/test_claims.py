@@ -10,6 +10,7 @@ from claim_mutants import simulated, survivors
 from vibsim.analysis import analyse_records, summarise, verdicts
 from vibsim.experiment import Experiment
 from vibsim.report import choice, style
+from vibsim.report.data import Results
 from vibsim.report.figures import of_source
 from vibsim.report.page import player
 
@@ -29,13 +30,11 @@ def test_every_claim_turns_with_its_number_and_every_figure_is_drawn(name: str) 
     assert survivors(experiment, levels) == []
     if not experiment.figures:
         return
-    record = analyse_records(experiment, levels)
-    lead = choice.find_lead(
-        experiment, record, summarise(experiment, verdicts(experiment, record), record)
-    )
+    record = Results.of(experiment, analyse_records(experiment, levels))
+    lead = choice.find_lead(record, summarise(experiment, verdicts(experiment, record), record))
     with style.applied():
-        found = of_source.pictures(experiment, record, lead)
-    has_player = bool(player.element(experiment, record))
+        found = of_source.pictures(lead)
+    has_player = bool(player.element(record))
     assert of_source.undrawn(found, has_player=has_player) == []
     names = [picture.name for _, pictures in found for picture in pictures]
     assert len(names) == len(set(names))

@@ -15,6 +15,7 @@ from vibsim.comparison import best_values
 from vibsim.core.record import Record
 from vibsim.experiment import canonical, storage
 from vibsim.report import choice, style
+from vibsim.report.data import Results
 from vibsim.report.figures import drawing, gallery
 from vibsim.simulation import simulate_record
 
@@ -70,7 +71,7 @@ def record(exp: Any) -> Any:
             variable.values.flags.writeable = False
         RECORDS[key] = made
     found = RECORDS[key]
-    return Record(dict(found.coords), dict(found.variables), dict(found.attrs))
+    return Results.of(exp, Record(dict(found.coords), dict(found.variables), dict(found.attrs)))
 
 
 def summary(exp: Any, rec: Any, **changes: Any) -> dict[str, Any]:
@@ -83,9 +84,9 @@ def plan(exp: Any) -> Any:
 
 def views(exp: Any, rec: Any, *quantities: str) -> tuple[dict[str, Any], list[str]]:
     """Return the views over members by the names of their files, and what all members share in words."""
-    decisive = choice.find_lead(exp, rec, {"checks": []})
+    decisive = choice.find_lead(rec, {"checks": []})
     with style.applied():
-        found, told = gallery.over_members(exp, rec, list(quantities), decisive)
+        found, told = gallery.over_members(list(quantities), decisive)
     return {view.picture.name: view for view in found}, told
 
 

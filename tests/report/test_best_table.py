@@ -14,6 +14,7 @@ import samples
 from vibsim.analysis import analyse_records
 from vibsim.core.record import Record
 from vibsim.report import choice, words
+from vibsim.report.data import Results
 from vibsim.report.tables import best
 from vibsim.report.tables.latex import to_latex
 from vibsim.report.tables.table import to_csv
@@ -22,7 +23,7 @@ from vibsim.simulation import simulate_record
 
 def table(exp: object) -> tuple[Record, best.Table]:
     record = samples.record(exp)
-    found = best.table(samples.plain().model.definition, record, choice.members(record, "theta"))
+    found = best.table(record, choice.members(record, "theta"))
     assert found is not None
     return record, found
 
@@ -59,7 +60,7 @@ def test_what_is_unknown_is_said() -> None:
     record, _ = table(samples.plain())
     bound = record.variables["period_richardson_error"]
     record.variables["period_richardson_error"] = replace(bound, values=np.nan * bound.values)
-    found = best.table(samples.plain().model.definition, record, choice.members(record, "theta"))
+    found = best.table(record, choice.members(record, "theta"))
     assert found is not None
     assert any("unknown" in row for row in found.text_rows())
     assert rows(found)["period [s]"]["bound"] == ""
@@ -68,10 +69,7 @@ def test_what_is_unknown_is_said() -> None:
 def test_one_level_has_no_table_and_a_sweep_names_its_members() -> None:
     exp = samples.plain(levels=[9])
     record = samples.record(exp)
-    assert (
-        best.table(samples.plain().model.definition, record, choice.members(record, "theta"))
-        is None
-    )
+    assert best.table(record, choice.members(record, "theta")) is None
     _, found = table(samples.swept(4))
     assert "member" in [column.header for column in found.columns]
 
@@ -83,8 +81,8 @@ def test_a_lean_record_has_period_and_amplitude() -> None:
         level: Record(row.coords, row.variables, {**row.attrs, "storage": "lean"})
         for level, row in levels.items()
     }
-    record = analyse_records(exp, lean)
-    found = best.table(samples.plain().model.definition, record, choice.members(record, "theta"))
+    record = Results.of(exp, analyse_records(exp, lean))
+    found = best.table(record, choice.members(record, "theta"))
     assert found is not None
     assert {row[0] for row in found.rows} == {"period [s]", "amplitude [rad]"}
     assert not {"GCI", "order"} & {column.header for column in found.columns}
@@ -141,12 +139,12 @@ def test_a_period_of_a_motion_that_has_none_is_left_out_unless_it_is_asked_for()
         model={"kind": "duffing", "delta": 0.1, "alpha": 1.0, "beta": 0.04, "gamma": 1.0, "omega": 1.0},
         initial={"u": 0.0, "v": 0.0}, schemes=["rk4"],
     )  # fmt: skip
-    record, model = samples.record(driven), driven.model.definition
+    record = samples.record(driven)
     shown = choice.members(record, "u")
-    found = [row[0] for row in best.table(model, record, shown).rows]
+    found = [row[0] for row in best.table(record, shown).rows]
     assert not [
         name for name in found if name.startswith(("period", "growth", "angular frequency"))
     ]
     assert any(name.startswith("amplitude") for name in found)
-    asked = [row[0] for row in best.table(model, record, shown, ["period"]).rows]
+    asked = [row[0] for row in best.table(record, shown, ["period"]).rows]
     assert [name for name in asked if name not in found] == ["period [s]"]

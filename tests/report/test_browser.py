@@ -123,11 +123,11 @@ slider.dispatchEvent(new Event("input"));
     ["dragged", "elastic_pendulum", "vehicle", "sliding_box", "washing_machine", "oscillator"],
 )
 def test_the_script_draws_what_the_still_picture_draws(tmp_path, name):
-    exp, record = made(name)
-    lanes = player.lanes(exp, record)
+    record = made(name)
+    lanes = player.lanes(record)
     path, frame = tmp_path / "page.html", 37
     go = GO.replace("FRAME", str(frame))
-    path.write_text(f"{HEAD}<body>{player.element(exp, record)}{go}</body>", encoding="utf-8")
+    path.write_text(f"{HEAD}<body>{player.element(record)}{go}</body>", encoding="utf-8")
     page = shown(path)
     found = paths(page)
     assert len(found) == len(lanes)
@@ -177,13 +177,13 @@ const wait = setInterval(() => {
 
 
 def test_the_player_plays_pauses_and_steps_by_keys(tmp_path):
-    exp, record = made()
-    text, path = player.element(exp, record), tmp_path / "page.html"
+    record = made()
+    text, path = player.element(record), tmp_path / "page.html"
     path.write_text(f"{HEAD}{CLOCK}<body>{text}{KEYS}</body>", encoding="utf-8")
     told = re.search(r"<title>([^<]*)</title>", shown(path, wait=6000))
     assert told is not None
     on, back, last, first, played, is_paused = told.group(1).split()
-    frames = player.lanes(exp, record)[0].motion.t.size - 1
+    frames = player.lanes(record)[0].motion.t.size - 1
     assert (on, back, int(last), first) == ("2", "1", frames, "0")
     assert 0 < int(played) < frames
     assert is_paused == "true"

@@ -10,8 +10,8 @@ import pytest
 import samples
 
 from vibsim import report
-from vibsim.report import choice, data, finest_level, style, words
-from vibsim.report.data import Member
+from vibsim.report import choice, finest_level, style, words
+from vibsim.report.data import Ladder, Member
 from vibsim.report.figures import order, scenes, solution, time
 from vibsim.report.page import hero
 from vibsim.report.tables import levels as contents
@@ -33,7 +33,7 @@ def factors(exp):
     record = samples.record(exp)
     summary = samples.summary(exp, record)
     for check in summary["checks"]:
-        found = choice.find_lead(exp, record, {**summary, "checks": [check]})
+        found = choice.find_lead(record, {**summary, "checks": [check]})
         yield check, findings.factor(found)
 
 
@@ -87,7 +87,7 @@ def test_svg_is_written_whatever_else_is_asked_for(tmp_path):
 def test_an_empty_panel_says_why_and_a_caption_names_only_what_is_drawn(changes, notes, absent):
     exp = samples.experiment(**changes)
     with style.applied():
-        picture = order.against_step(exp, samples.record(exp), "theta", 0)
+        picture = order.against_step(samples.record(exp), "theta", 0)
         text = samples.svg(picture)
     assert all(note in text for note in notes)
     assert not [word for word in absent if word in picture.caption]
@@ -98,7 +98,7 @@ def test_a_caption_names_the_dotted_line_where_it_is_drawn():
     scheme = {"kind": "central", "arithmetic": "three_term"}
     exp = samples.experiment(schemes=[scheme], levels=[10, 12, 14, 16], samples="common")
     with style.applied():
-        picture = order.against_step(exp, samples.record(exp), "theta", 0)
+        picture = order.against_step(samples.record(exp), "theta", 0)
         text = samples.svg(picture)
     assert ("dotted" in picture.caption) == ("predicted round-off" in text)
     assert "dotted" in picture.caption
@@ -135,7 +135,7 @@ def test_a_page_leads_with_the_member_and_scheme_of_the_decisive_result():
     record, summary = samples.record(exp), samples.summary(exp, samples.record(exp))
     for entry in summary["checks"]:
         for result in entry["results"]:
-            led = choice.find_lead(exp, record, {"checks": [entry | {"results": [result]}]}).member
+            led = choice.find_lead(record, {"checks": [entry | {"results": [result]}]}).member
             assert (led.case, led.scheme_name) == (result["case"], result["scheme"])
     assert {row["scheme"] for row in summary["checks"][0]["results"]} == set(schemes)
     assert {row["case"] for row in summary["checks"][0]["results"]} == {1}
@@ -150,9 +150,9 @@ def test_a_sweep_names_a_member_once_per_block_of_a_page_and_in_every_row_of_a_f
     page = (tmp_path / "report.html").read_text(encoding="utf-8")
     start = page.index('<section id="numbers"')
     table = page[start : page.index("</table>", start)]
-    decisive = choice.find_lead(exp, record, summary).member
+    decisive = choice.find_lead(record, summary).member
     assert re.findall(r'rowgroup" colspan="9">([^<]*)<', table) == [
-        f"central, {words.swept(data.case_name(record, m.case))}"
+        f"central, {words.swept(record.case_name(m.case))}"
         for m in choice.members(record, "theta", decisive)
     ]
     assert table.count('<th scope="col"') == 9
@@ -167,7 +167,7 @@ def test_a_sweep_names_a_member_once_per_block_of_a_page_and_in_every_row_of_a_f
 def test_the_typical_member_passes_where_one_does(values):
     exp = samples.experiment(sweep={"model.g": values}, levels=[6, 7, 8, 9])
     record = samples.record(exp)
-    roles = {m.role: data.flags(record, "theta_status")[0, m.case] for m in
+    roles = {m.role: record.flags("theta_status")[0, m.case] for m in
              choice.members(record, "theta")}  # fmt: skip
     assert roles == {"typical": "PASS", "worst": "FAIL"}
 
@@ -183,8 +183,8 @@ def test_a_run_that_grows_is_cut_off_or_drawn_by_its_size():
     for rec, case in [(record, 0), (grown, 2), (grown, 8)]:
         member = Member(0, case, "central", role="worst")
         with style.applied():
-            top = solution.solution(exp, rec, "theta", member).figure.axes[0]
-            curves = time.overlay(rec, "theta", member).figure.axes[0]
+            top = solution.solution(Ladder(rec, "theta", member)).figure.axes[0]
+            curves = time.overlay(Ladder(rec, "theta", member)).figure.axes[0]
         size = np.abs(rec["theta_exact"][case]).max()
         assert max(np.abs(top.get_ylim())) <= 3.0 * size * (1 + 1e-12)
         assert curves.get_yscale() == "log" or max(np.abs(curves.get_ylim())) < 1e6
@@ -195,11 +195,11 @@ def test_a_run_that_grows_is_cut_off_or_drawn_by_its_size():
 def test_time_ends_with_the_breakdown_and_the_panel_says_so():
     exp = samples.experiment(**STIFF)
     record = samples.record(exp)
-    t, member = data.times(record, 2), Member(0, 2, "central", role="worst")
+    t, member = record.times(2), Member(0, 2, "central", role="worst")
     with style.applied():
         pages = [
-            solution.solution(exp, record, "theta", member),
-            time.overlay(record, "theta", member),
+            solution.solution(Ladder(record, "theta", member)),
+            time.overlay(Ladder(record, "theta", member)),
         ]
     for page in pages:
         top = page.figure.axes[0]
@@ -209,7 +209,7 @@ def test_time_ends_with_the_breakdown_and_the_panel_says_so():
 
 def test_without_a_member_that_passes_the_typical_one_is_the_least_bad():
     record = samples.record(samples.experiment(**STIFF))
-    roles = {m.role: data.flags(record, "theta_status")[0, m.case] for m in
+    roles = {m.role: record.flags("theta_status")[0, m.case] for m in
              choice.members(record, "theta")}  # fmt: skip
     assert roles == {"typical": "INCONCLUSIVE", "worst": "FAIL"}
 
@@ -234,7 +234,7 @@ def test_the_set_up_names_parameters_as_the_equation_does():
         initial={"u": 1.0},
         levels=[6, 7, 8],
     )
-    rows = dict(setting.setup(exp, samples.record(exp)))
+    rows = dict(setting.setup(samples.record(exp)))
     assert rows["Parameters"] == "m = 1 kg, b = 0.1 kg s⁻¹ (damping.linear), k = 2"
 
 
@@ -246,16 +246,16 @@ def test_an_undecided_verdict_states_no_order_anywhere():
         checks=[{"value": "event_count", "above": 0}],
     )  # fmt: skip
     record = samples.record(exp)
-    (member,) = data.all_members(record)
-    assert data.flags(record, "u_status").item() == "INCONCLUSIVE"
+    (member,) = record.all_members
+    assert record.flags("u_status").item() == "INCONCLUSIVE"
     assert np.isfinite(record["u_order"]).any()
-    lead = choice.find_lead(exp, record, samples.summary(exp, record))
-    assert not [n for n in hero.numbers(exp, record, lead) if "order" in n["label"]]
+    lead = choice.find_lead(record, samples.summary(exp, record))
+    assert not [n for n in hero.numbers(lead) if "order" in n["label"]]
     counts = [row[-1] for row in contents.orders(record, "u", [member]).rows]
     assert "yes" not in counts
     # nothing can be extrapolated either
     with style.applied():
-        assert "the finest solution" in solution.motion(exp, record, "u", member).caption
+        assert "the finest solution" in solution.motion(Ladder(record, "u", member)).caption
 
 
 def test_an_amplitude_of_a_motion_that_still_changes_is_not_settled():
@@ -267,8 +267,7 @@ def test_an_amplitude_of_a_motion_that_still_changes_is_not_settled():
                     model=oscillator | damping, initial={"u": 1.0, "v": 0.0}, levels=[8, 9],
                     time={"end": 60.0}, checks=[], sweep={"initial.u": [1.0, 2.0]},
                 )
-            ),
-            "u",
+            )
         ).tolist()
         for damping in ({}, {"damping": {"linear": 0.1}})
     ]  # fmt: skip

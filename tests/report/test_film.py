@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 import samples
 
+from vibsim.report.data import Results
 from vibsim.report.movie import film
 from vibsim.simulation import simulate_record
 
@@ -15,10 +16,10 @@ def shown(end=20.0, level=10, model=None, initial=None, end_shown=None, **option
     exp = samples.experiment(
         model=model, initial=initial, time={"end": end}, levels=[level - 1, level], schemes=["central"], checks=[],
     )  # fmt: skip
-    record = simulate_record(exp, level)
+    record = Results.of(exp, simulate_record(exp, level))
     name = exp.model.definition.position
-    run = film.run(exp, record, "central", name)
-    return film.film(exp, record, [run], name, end=end_shown, **({"fps": 25.0} | options))
+    run = film.run(record, "central", name)
+    return film.film(record, [run], name, end=end_shown, **{"fps": 25.0} | options)
 
 
 def test_a_short_run_is_shown_whole_and_a_long_one_in_a_window_that_moves():

@@ -18,7 +18,8 @@ from vibsim.core.vocabulary import REASONS
 from vibsim.experiment import Experiment
 from vibsim.experiment.experiment import canonical
 from vibsim.experiment.schema.checks import MEASURED
-from vibsim.report import choice, data, style, words
+from vibsim.report import choice, style, words
+from vibsim.report.data import Ladder, Results
 from vibsim.report.figures import gallery
 from vibsim.report.figures import hero as drawn
 from vibsim.report.page import cards, hero, page_tables
@@ -33,12 +34,12 @@ WRONG = [{"kind": "central", "start": "first_order"}]
 def found(exp):
     record = samples.record(exp)
     summary = samples.summary(exp, record)
-    return record, summary, choice.find_lead(exp, record, summary)
+    return record, summary, choice.find_lead(record, summary)
 
 
 def first(exp):
-    record, summary, decisive = found(exp)
-    return hero.context(exp, record, summary, decisive)
+    _, summary, decisive = found(exp)
+    return hero.context(summary, decisive)
 
 
 def test_every_reason_and_every_kind_of_check_has_a_title():
@@ -97,15 +98,15 @@ def test_an_order_of_some_members_alone_says_of_how_many(theta, where):
         checks=[{"converges": "theta", "at": {"initial.theta": theta}}],
     )
     record, summary, decisive = found(exp)
-    shown = hero.context(exp, record, summary, decisive)
+    shown = hero.context(summary, decisive)
     assert shown["finding"] == f"The angle θ converges at second order {where}"
     asked = 2 if theta == 1.0 else 1
     assert f"The check asks about {asked} of the 3 members" in shown["meaning"]
     assert (f"of {asked} of the 3 members" in shown["numbers"][0]["note"]) == (asked > 1)
     assert assertions.about(exp.checks[0], record) == f"Order of θ (initial θ = {theta:g} rad)"
-    drawn_of = {member.case for member in gallery.choose(exp, record, decisive.member)[0]}
+    drawn_of = {member.case for member in gallery.choose(record, decisive.member)[0]}
     assert decisive.member.case in drawn_of
-    _, tables = page_tables.collect(exp, record, summary, decisive, [])
+    _, tables = page_tables.collect(summary, decisive, [])
     (_, table, _), *_ = tables["numbers_shown"]
     assert table.rows[0][1].startswith(f"initial.theta = {theta:g} rad")
 
@@ -124,8 +125,8 @@ def test_the_worst_check_leads_and_a_trap_never_does_where_another_passed():
 
 def test_the_large_numbers_are_those_of_the_facts():
     exp = samples.experiment()
-    record, summary, decisive = found(exp)
-    order, error, best = list(hero.numbers(exp, record, decisive))[:3]
+    _, summary, decisive = found(exp)
+    order, error, best = list(hero.numbers(decisive))[:3]
     facts = summary["checks"][0]["results"][0]["facts"]
     assert order["value"] == f"{facts['order']:.3f}"
     # the L2 norm over 20 s as a root of the mean of squares
@@ -178,7 +179,7 @@ def test_badges_tell_a_claim_and_a_trap_from_a_check_that_passed():
     ]
     exp = samples.experiment(checks=checks)
     record, summary, _ = found(exp)
-    assert [card["badge"] for card in cards.cards(exp, record, summary)] == [
+    assert [card["badge"] for card in cards.cards(record, summary)] == [
         "passed", "as claimed", "shown to be false", "trap caught", "failed",
     ]  # fmt: skip
     # the index says the same words of the same checks
@@ -191,13 +192,13 @@ def test_the_error_over_the_step_is_in_the_norm_of_the_check(norm):
     exp = samples.experiment(checks=checks)
     record, _, decisive = found(exp)
     with style.applied():
-        ax = drawn.against_step(record, decisive).figure.axes[0]
+        ax = drawn.against_step(decisive).figure.axes[0]
     lines = {line.get_label(): np.asarray(line.get_ydata()) for line in ax.lines}
     here = {"scheme": 0, "case": 0, "norm": norm}
-    true = data.pick(record, "theta_error_norm", **here)
+    true = record.pick("theta_error_norm", **here)
     mean = {"l1": 20.0, "l2": 20.0**0.5}.get(norm, 1.0)
     np.testing.assert_allclose(lines["true"], true / mean, rtol=1e-12)
-    gap = data.pick(record, "theta_difference_norm", **here) / mean
+    gap = record.pick("theta_difference_norm", **here) / mean
     # the difference of two levels is 1 - 1/4 of the error of the coarser one
     np.testing.assert_allclose(lines["estimated"][:-1], gap / 0.75, rtol=0.01)
     assert ("root-mean-square" in ax.get_title(loc="left")) == (norm == "l2")
@@ -209,7 +210,7 @@ def test_a_caption_names_the_exact_solution_only_where_it_is_drawn(monkeypatch):
         exp = samples.experiment(model={"kind": "pendulum", "drag": drag}, levels=[6])
         record, _, decisive = found(exp)
         with style.applied():
-            picture = drawn.solution(exp, record, "theta", decisive.member, is_left=True)
+            picture = drawn.solution(Ladder(record, "theta", decisive.member), is_left=True)
             text = samples.svg(picture)
         assert ("exact" in picture.caption) == ("exact" in text) == (drag == 0.0)
 
@@ -321,7 +322,7 @@ def test_statements_stand_beside_the_finding_but_not_the_one_that_is_the_finding
 def test_a_number_has_the_digits_that_tell_it_from_what_is_asked(asked, told):
     exp = samples.experiment(levels=[9], checks=[{"value": "period", "at": {"level": 9}} | asked])
     record, summary, _ = found(exp)
-    assert cards.card(exp, record, summary["checks"][0])["got"] == told
+    assert cards.card(record, summary["checks"][0])["got"] == told
 
 
 def test_a_number_whose_bound_is_wider_than_what_is_asked_has_a_sentence_on_its_page():
@@ -330,7 +331,7 @@ def test_a_number_whose_bound_is_wider_than_what_is_asked_has_a_sentence_on_its_
         exp = samples.experiment(checks=[period | {"atol": atol}])
         record, summary, _ = found(exp)
         assert summary["checks"][0]["status"] == "PASS"
-        card = cards.card(exp, record, summary["checks"][0])
+        card = cards.card(record, summary["checks"][0])
         assert ("do not prove it" in card["text"]) is is_told
 
 
@@ -340,21 +341,21 @@ def test_a_large_number_is_not_rounded_before_its_point():
         checks=[{"value": "period", "at": {"level": 9}, "above": 6e4}],
     )  # fmt: skip
     record, summary, _ = found(exp)
-    assert cards.card(exp, record, summary["checks"][0])["got"] == "66996 s"
+    assert cards.card(record, summary["checks"][0])["got"] == "66996 s"
 
 
 def test_an_order_beside_the_band_whose_interval_reaches_it_is_told_as_such(monkeypatch):
     exp = samples.experiment(sweep={"initial.theta": [0.5, 1.0]}, checks=[{"converges": "theta"}])
-    record, _, decisive = found(exp)
+    _, _, decisive = found(exp)
     for order, low, title in (
         (2.05, 2.0, "All members keep"),
         (2.3, 2.05, "1 of 2 orders is outside the band, but its interval overlaps it"),
         (2.3, 2.15, "1 of 2 members has"),
     ):
         ends = (np.array([row]) for row in ([2.0, order], [2.0, low], [2.0, order]))
-        monkeypatch.setattr(data, "orders", lambda *_, ends=tuple(ends): ends)
+        monkeypatch.setattr(Results, "orders", lambda *_, ends=tuple(ends): ends)
         with style.applied():
-            assert drawn.orders(exp, record, decisive).title.startswith(title)
+            assert drawn.orders(decisive).title.startswith(title)
 
 
 def test_a_row_of_checks_says_of_how_many_results_it_shows_one():
@@ -362,7 +363,7 @@ def test_a_row_of_checks_says_of_how_many_results_it_shows_one():
     checks = [{"converges": "theta", "order": order} for order in (2, 3)]
     exp = samples.experiment(sweep={"initial.theta": [0.5, 1.0]}, checks=checks)
     record, summary, _ = found(exp)
-    passed, failed = (card["got"] for card in cards.cards(exp, record, summary))
+    passed, failed = (card["got"] for card in cards.cards(record, summary))
     assert passed.endswith(", the hardest of 2")
     assert failed.endswith("; 2 of 2 failed")
 
@@ -380,9 +381,9 @@ def test_a_row_of_checks_says_of_how_many_results_it_shows_one():
 def test_few_members_are_no_response_and_a_check_on_one_is_shown_on_that(check, pictures):
     """The first screen showed two dots, of an amplitude that nobody had asked for."""
     exp = samples.experiment(sweep={"initial.theta": [0.5, 1.0]}, checks=[check])
-    record, _, decisive = found(exp)
+    _, _, decisive = found(exp)
     with style.applied():
-        shown = hero.pictures(exp, record, decisive)
+        shown = hero.pictures(decisive)
         assert [picture.name for picture in shown] == pictures
 
 
@@ -392,9 +393,9 @@ def test_the_number_that_decides_is_the_one_that_is_drawn_over_the_members():
     exp = samples.experiment(
         sweep={"initial.theta": {"linspace": [0.5, 1.5, 9]}}, checks=[asked | {"below": 9}]
     )
-    record, summary, decisive = found(exp)
+    _, summary, decisive = found(exp)
     with style.applied():
-        shown = hero.pictures(exp, record, decisive)[0]
+        shown = hero.pictures(decisive)[0]
     assert (shown.name, shown.title) == (
         "hero_response",
         "Value of θ at the end at level 7 in 9 members",
@@ -412,11 +413,11 @@ def test_members_have_the_level_and_the_unit_of_their_numbers_where_all_are_redu
     exp = samples.experiment(sweep=sweep, checks=[asked])
     record, summary, decisive = found(exp)
     with style.applied():
-        shown = hero.pictures(exp, record, decisive)[0]
+        shown = hero.pictures(decisive)[0]
     assert shown.title == "Largest absolute value of θ at level 7 in 9 members"
     assert "[rad]" in shown.figure.axes[0].get_title(loc="left")
     assert "finest" not in shown.caption
-    card = cards.card(exp, record, summary["checks"][0])
+    card = cards.card(record, summary["checks"][0])
     assert card["what"] == "Place of the largest absolute value of θ over initial θ at level 7"
 
 
@@ -430,7 +431,7 @@ def test_every_scheme_with_an_error_has_its_entry():
     variable = record.variables["theta_difference_norm"]
     record.variables["theta_difference_norm"] = Variable(variable.dims, norms, variable.attrs)
     with style.applied():
-        shown = drawn.against_step(record, decisive).figure.axes[0]
+        shown = drawn.against_step(decisive).figure.axes[0]
     assert {"central", "rk4"} <= {text.get_text() for text in shown.get_legend().get_texts()}
 
 
@@ -439,7 +440,7 @@ def test_a_row_names_its_number_and_its_member_in_words_with_units():
     asked = {"value": "max_abs", "quantity": "energy_deviation", "at": {"model.g": 1.0}, "below": 9}
     exp = samples.experiment(sweep={"model.g": [1.0, 2.0]}, checks=[asked])
     record, summary, _ = found(exp)
-    card = cards.card(exp, record, summary["checks"][0])
+    card = cards.card(record, summary["checks"][0])
     assert card["what"] == "Largest absolute value of ΔE at g = 1 m s⁻²"
     assert card["wanted"] == "below 9 J"
     names = ("wire_force", "x_3", "u_left", "theta", "theta_left")
@@ -454,7 +455,7 @@ def test_an_order_that_misses_its_promise_says_that_nothing_asks_for_it():
     for check, is_told in ((value, True), ({"converges": "theta", "order": "scheme"}, False)):
         exp = samples.experiment(schemes=[scheme], checks=[check])
         record, _, decisive = found(exp)
-        notes = [number["note"] for number in hero.numbers(exp, record, decisive)]
+        notes = [number["note"] for number in hero.numbers(decisive)]
         assert any("promises 2, which no check asks for" in note for note in notes) is is_told
     # a check of an order passes where the interval reaches it
     exp = samples.experiment(schemes=[scheme], checks=[value])
@@ -462,7 +463,7 @@ def test_an_order_that_misses_its_promise_says_that_nothing_asks_for_it():
     high = record.variables["theta_order_high"]
     values = np.full(np.shape(high.values), 2.0)
     record.variables["theta_order_high"] = Variable(high.dims, values, high.attrs)
-    assert not any("no check" in number["note"] for number in hero.numbers(exp, record, decisive))
+    assert not any("no check" in number["note"] for number in hero.numbers(decisive))
 
 
 def test_of_a_long_run_the_last_periods_are_shown():
@@ -472,7 +473,7 @@ def test_of_a_long_run_the_last_periods_are_shown():
     )
     record, _, decisive = found(exp)
     with style.applied():
-        shown = drawn.solution(exp, record, "theta", decisive.member, is_left=True)
+        shown = drawn.solution(Ladder(record, "theta", decisive.member), is_left=True)
     assert shown.title.endswith("last 6 periods")
     low, high = shown.figure.axes[0].dataLim.intervalx
     assert high - low == pytest.approx(12 * np.pi, rel=0.02)
@@ -481,16 +482,16 @@ def test_of_a_long_run_the_last_periods_are_shown():
 def test_the_interval_of_an_order_says_what_it_is():
     exp = samples.experiment()
     record, summary, decisive = found(exp)
-    order = next(hero.numbers(exp, record, decisive))
+    order = next(hero.numbers(decisive))
     facts = summary["checks"][0]["results"][0]["facts"]
     interval = words.interval((facts["order_low"], facts["order_high"]))
     assert order["note"] == f"95 % interval {interval}; the scheme promises 2"
     assert "a probability of 95 %" in glossary.explained(order["note"])
-    card = cards.card(exp, record, summary["checks"][0])
+    card = cards.card(record, summary["checks"][0])
     assert interval in card["got"]
     assert "in brackets above: the stated order with its 95 % interval" in card["picture"].caption
     several = samples.experiment(schemes=["central", "rk4"])
-    table = theory.schemes(several, samples.record(several))
+    table = theory.schemes(samples.record(several))
     place = [column.header for column in table.columns].index("measured (95 % interval)")
     for row in table.text_rows():
         assert re.fullmatch(r"\d\.\d{3} \(\d\.\d+ to \d\.\d+\)", row[place])
@@ -501,9 +502,9 @@ def test_members_that_the_check_does_not_ask_about_are_not_counted_and_are_grey(
         sweep={"initial.theta": [0.5, 1.0, 1.5]},
         checks=[{"converges": "theta", "at": {"initial.theta": 1.0}}],
     )
-    record, _, decisive = found(exp)
+    _, _, decisive = found(exp)
     with style.applied():
-        picture = drawn.orders(exp, record, decisive)
+        picture = drawn.orders(decisive)
     assert picture.title == "1 of 1 members asked about are in the band; grey: the 2 others"
     assert "does not ask about the grey members" in picture.caption
     colours = {
@@ -516,9 +517,7 @@ def test_the_best_value_has_as_many_digits_as_its_bound():
     """A bound of 1e-13 beside twelve digits would say more than the value."""
     exp = samples.experiment(levels=[9, 10, 11, 12], schemes=["rk4"])
     record, _, decisive = found(exp)
-    best = next(
-        row for row in hero.numbers(exp, record, decisive) if row["label"].startswith("Best")
-    )
+    best = next(row for row in hero.numbers(decisive) if row["label"].startswith("Best"))
     bound = float(record["theta_end_richardson_error"][0, 0])
     digits = best["value"].split()[0].partition(".")[2]
     assert len(digits) == 1 - np.floor(np.log10(bound))
@@ -528,9 +527,9 @@ def test_the_best_value_has_as_many_digits_as_its_bound():
 @pytest.mark.slow
 def test_a_curve_over_the_sweep_counts_the_members_that_have_the_number():
     exp = samples.swept(16)
-    record, _, decisive = found(exp)
+    _, _, decisive = found(exp)
     with style.applied():
-        shown = drawn.response(exp, record, decisive)
+        shown = drawn.response(decisive)
     assert shown.title == "Period in 15 of 16 members"
     assert "The others have no period." in shown.caption
 
@@ -538,7 +537,7 @@ def test_a_curve_over_the_sweep_counts_the_members_that_have_the_number():
 def test_an_order_that_its_scheme_promises_is_not_said_to_be_less_than_that():
     checks = [{"converges": "theta", "order": 3}]
     exp = samples.experiment(checks=checks)
-    shown, (check,) = first(exp), cards.cards(exp, *found(exp)[:2])
+    shown, (check,) = first(exp), cards.cards(*found(exp)[:2])
     assert shown["meaning"] == check["meaning"]
     assert "promises here, which is lower than the expected one" in shown["meaning"]
 
@@ -557,8 +556,8 @@ def test_the_promised_slope_goes_no_further_than_the_errors_and_needs_two_levels
 
 def test_a_quantity_with_a_long_name_is_told_in_words_and_leaves_the_legend_small():
     exp = Experiment.from_yaml(CONFIGS / "vibration_text/bumpy_road.yaml")
-    assert findings.short(exp, "absolute_position") == "the height of the body"
-    assert findings.short(exp, "u") == "u"
+    assert findings.short(exp.model.definition, "absolute_position") == "the height of the body"
+    assert findings.short(exp.model.definition, "u") == "u"
 
 
 def test_a_term_is_explained_once_and_text_stays_text():
@@ -609,9 +608,9 @@ def test_curves_of_the_first_screen_are_told_apart_without_colours_and_the_ring_
     exp = samples.experiment(
         sweep={"initial.theta": [0.5, 1.0, 2.0], "model.g": {"linspace": [1.0, 4.0, 5]}}
     )
-    record, _, decisive = found(exp)
+    _, _, decisive = found(exp)
     with style.applied():
-        ax = drawn.response(exp, record, decisive).figure.axes[0]
+        ax = drawn.response(decisive).figure.axes[0]
     curves = [line for line in ax.lines if not line.get_label().startswith("_")]
     looks = {(line.get_marker(), str(line._unscaled_dash_pattern)) for line in curves}
     assert len(looks) == len(curves) == 3
@@ -626,8 +625,8 @@ def test_the_schemes_of_the_first_screen_have_markers_of_their_own_and_legends_h
     )
     record, _, decisive = found(exp)
     with style.applied():
-        steps = drawn.against_step(record, decisive).figure.axes[0]
-        curves = drawn.differences(record, decisive).figure.axes[0]
+        steps = drawn.against_step(decisive).figure.axes[0]
+        curves = drawn.differences(decisive).figure.axes[0]
     named = [line for line in steps.lines if line.get_label() in record.words("scheme")]
     assert len({line.get_marker() for line in named}) == len(named) == 3
     assert len(curves.lines) == 5
@@ -676,8 +675,8 @@ def test_a_letter_with_an_index_is_named_and_a_name_of_words_is_said_in_words() 
     model = {"kind": "system", "repeat": {"n": 3, "i": chain}, "outputs": {"far_end": "x_3"}}
     run = {"title": "t", "model": model, "initial": {"x_1": 1}, "time": {"end": 1}}
     exp = Experiment.from_dict({**run, "levels": [4, 5, 6], "schemes": ["rk4"]})
-    assert findings.short(exp, "x_3") == "x_3"
-    assert findings.short(exp, "far_end").startswith("the ")
+    assert findings.short(exp.model.definition, "x_3") == "x_3"
+    assert findings.short(exp.model.definition, "far_end").startswith("the ")
 
 
 @pytest.mark.usefixtures("unrendered")
@@ -702,7 +701,7 @@ def test_coordinates_together_have_numbers_and_no_picture_over_time(sweep, names
     )
     record, summary, decisive = found(exp)
     with style.applied():
-        assert sorted(picture.name for picture in hero.pictures(exp, record, decisive)) == names
+        assert sorted(picture.name for picture in hero.pictures(decisive)) == names
     report.write(samples.plan(exp), record, summary, tmp_path)
     page = (tmp_path / "report.html").read_text(encoding="utf-8")
     assert "position vector converges at the order that both schemes promise" in page

@@ -12,7 +12,7 @@ from matplotlib.text import Text
 from thinned import thinned
 
 from vibsim.report import choice, frame, style
-from vibsim.report.data import Member
+from vibsim.report.data import Ladder, Member
 from vibsim.report.figures import (
     drawing,
     energy,
@@ -129,13 +129,13 @@ def test_no_word_leaves_a_figure(case):
 
     exp = spring(**CASES[case])
     record = samples.record(exp)
-    shown, _ = gallery.choose(exp, record)
+    shown, _ = gallery.choose(record)
     with style.applied():
-        decisive = choice.find_lead(exp, record, samples.summary(exp, record))
-        below = gallery.pictures(exp, record, shown, decisive, [])
+        decisive = choice.find_lead(record, samples.summary(exp, record))
+        below = gallery.pictures(shown, decisive, [])
         behind = [picture for _, tab in below.belief for picture in tab]
         behind += [view.picture for view in below.members]
-        for picture in [*hero.pictures(exp, record, decisive), *below.motion, *behind]:
+        for picture in [*hero.pictures(decisive), *below.motion, *behind]:
             FigureCanvasAgg(picture.figure)
             assert not drawn_outside(picture.figure), picture.name
 
@@ -154,7 +154,7 @@ def test_few_common_times_are_not_told_to_be_round_off():
     record = samples.record(exp)
     assert np.isnan(np.asarray(record["i_ratio"])).all()
     with style.applied():
-        figure = time.overlay(record, "i", Member(0, 0, "rk4")).figure
+        figure = time.overlay(Ladder(record, "i", Member(0, 0, "rk4"))).figure
     assert "too few common times for ratios" in words_of(figure)
 
 
@@ -164,7 +164,7 @@ def test_runs_that_broke_down_are_not_told_to_be_round_off(overflowing):
     assert (record["status"] != 0).any()
     for s, name in enumerate(record.words("scheme")):
         with style.applied():
-            figure = time.overlay(record, "u", Member(s, 0, name)).figure
+            figure = time.overlay(Ladder(record, "u", Member(s, 0, name))).figure
         assert "round-off" not in words_of(figure)
         if (record["status"][s, 0] != 0).all():
             assert "(broke down)" in words_of(figure)
@@ -202,9 +202,9 @@ def test_the_local_amplitude_is_shown_or_said_to_be_cut():
     for steps, cut in ((0.3184, False), (0.33, True)):
         exp = spring(schemes=["central"], levels=[0], time={"end": steps * 50, "base_dt": steps})
         record = samples.record(exp)
-        shown, _ = gallery.choose(exp, record)
+        shown, _ = gallery.choose(record)
         with style.applied():
-            picture = extrema.local(exp, record, shown)
+            picture = extrema.local(record, shown)
         peaks = record["peak"][np.isfinite(record["peak"])]
         top = picture.figure.axes[1].get_ylim()[1]
         assert bool(peaks.max() > extrema.CUT_OFF) == cut
@@ -228,10 +228,10 @@ def test_the_legend_of_work_and_precision_has_a_name_for_every_symbol():
     exp = spring(schemes=MANY, levels=[0, 1])
     record = samples.record(exp)
     with style.applied():
-        figure = work.precision(exp, record, 0).figure
+        figure = work.precision(record, 0).figure
         figure.draw_without_rendering()
     (legend,) = figure.legends
-    names = {line.name for line in lines(exp, record, 0)}
+    names = {line.name for line in lines(record, 0)}
     assert {text.get_text() for text in legend.get_texts()} >= names
     for text in legend.get_texts():
         box = text.get_window_extent()
@@ -240,9 +240,9 @@ def test_the_legend_of_work_and_precision_has_a_name_for_every_symbol():
 
 @pytest.mark.slow
 def test_coinciding_curves_are_told(few):
-    exp, record = few
+    _, record = few
     with style.applied():
-        picture = theory.order_and_stability(exp, record)
+        picture = theory.order_and_stability(record)
     assert "backward_euler:\n  same as forward_euler" in words_of(picture.figure)
     assert "central:\n  same as euler_cromer" in words_of(picture.figure)
     assert "phase error of backward_euler as of forward_euler" in picture.caption
@@ -251,19 +251,19 @@ def test_coinciding_curves_are_told(few):
 
 
 def test_a_colour_of_the_local_periods_is_a_scheme(few):
-    exp, record = few
+    _, record = few
     shown = [Member(s, 0, name) for s, name in enumerate(TEXT[:3])]
     with style.applied():
-        axes = extrema.local(exp, record, shown).figure.axes[2]
+        axes = extrema.local(record, shown).figure.axes[2]
     colours = [line.get_color() for line in axes.lines if line.get_marker() not in {"", "None"}]
     assert len(colours) == 6
     assert set(colours) == {style.look(s)["color"] for s in range(3)}
 
 
 def test_several_promised_slopes_are_told_apart(few):
-    exp, record = few
+    _, record = few
     with style.applied():
-        figure = order.against_step(exp, record, "u", 0).figure
+        figure = order.against_step(record, "u", 0).figure
     lines = [line for line in figure.axes[0].lines if str(line.get_label()).startswith("slope")]
     assert len(lines) > 1
     assert len({str(line._unscaled_dash_pattern) for line in lines}) == len(lines)
@@ -273,7 +273,7 @@ def test_several_promised_slopes_are_told_apart(few):
 @pytest.mark.slow
 def test_what_is_left_out_is_named():
     exp = spring(schemes=MANY, levels=[0, 1])
-    _, told = gallery.choose(exp, samples.record(exp))
+    _, told = gallery.choose(samples.record(exp))
     assert "more schemes have no figures over time" in told
 
 
@@ -282,7 +282,7 @@ def test_the_grey_line_of_a_motion_is_named_where_it_is_drawn(levels):
     model = {"kind": "elastic_pendulum", "beta": 0.9, "Theta": 40, "gamma": 0.05}
     exp = samples.experiment(model=model, initial={}, levels=levels)
     with style.applied():
-        picture = solution.motion(exp, samples.record(exp), "x", Member(0, 0, "central", ""))
+        picture = solution.motion(Ladder(samples.record(exp), "x", Member(0, 0, "central", "")))
     lines = picture.figure.axes[0].lines
     assert ("grey" in picture.caption) == any(line.get_color() == style.PALE for line in lines)
     assert ("grey" in picture.caption) == (len(levels) > 1)
@@ -295,8 +295,8 @@ def test_the_exact_solution_is_smooth_where_levels_have_few_points_in_a_period()
     record, member = samples.record(exp), Member(0, 0, "central", "")
     with style.applied():
         pictures = [
-            solution.motion(exp, record, "u", member),
-            first_screen.solution(exp, record, "u", member, is_left=True),
+            solution.motion(Ladder(record, "u", member)),
+            first_screen.solution(Ladder(record, "u", member), is_left=True),
         ]
     for picture in pictures:
         t, u = picture.figure.axes[0].lines[0].get_data()
@@ -309,10 +309,10 @@ def test_the_exact_solution_is_smooth_where_levels_have_few_points_in_a_period()
 def test_a_page_shows_periods_from_three_peaks_on(end, is_drawn):
     exp = samples.experiment(time={"end": end}, levels=[8, 9, 10], checks=[{"converges": "theta"}])
     record = samples.record(exp)
-    decisive = choice.find_lead(exp, record, samples.summary(exp, record))
-    shown = gallery.choose(exp, record)[0]
+    decisive = choice.find_lead(record, samples.summary(exp, record))
+    shown = gallery.choose(record)[0]
     with style.applied():
-        tabs = gallery.pictures(exp, record, shown, decisive, []).belief
-        assert extrema.local(exp, record, shown) is not None
+        tabs = gallery.pictures(shown, decisive, []).belief
+        assert extrema.local(record, shown) is not None
     names = [picture.name for _, tab in tabs for picture in tab]
     assert ("extrema_0" in names) == is_drawn

@@ -325,7 +325,7 @@ def test_the_index_calls_a_quantity_what_its_page_calls_it(tmp_path, check):
     assert summary["status"] != "PASS"
     report.write_index(tmp_path)
     told = " ".join(read(tmp_path / "index.html").text)
-    ours = cards.cards(exp, record, summary)[0]["text"]
+    ours = cards.cards(record, summary)[0]["text"]
     # a page writes its own powers of ten
     labels = re.compile(r"\b(?:θ|ω|ΔE|theta|omega|energy\w*)\b")
     assert labels.findall(ours)

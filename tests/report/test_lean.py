@@ -59,7 +59,7 @@ def test_a_lean_record_makes_a_page_without_series(tmp_path, sweep, figures, tim
     assert ".venv/bin/vibsim run pendulum_lab/theta@" in text
     assert len((tmp_path / "tables/members.csv").read_text().splitlines()) == exp.members + 1
     # the page of the whole record has the same table; its writer alone, without the figures
-    members.write_csv(tmp_path / "whole.csv", whole, "theta")
+    members.write_csv(tmp_path / "whole.csv", whole)
     assert (tmp_path / "whole.csv").read_bytes() == (tmp_path / "tables/members.csv").read_bytes()
 
 

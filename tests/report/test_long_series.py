@@ -9,7 +9,7 @@ import pytest
 import samples
 
 from vibsim.report import choice, style
-from vibsim.report.data import Member
+from vibsim.report.data import Ladder, Member
 from vibsim.report.figures import drawing, moments, solution
 from vibsim.report.figures.long_series import MOST_PANELS, PERIODS, long_series
 
@@ -25,9 +25,9 @@ def made(periods=40, schemes=("central",), levels=(0, 1, 2), steps=20, **changes
 
 
 def drawn(name="u", **changes):
-    exp, record, schemes = made(**changes)
+    _, record, schemes = made(**changes)
     with style.applied():
-        picture = long_series(exp, record, name, Member(0, 0, schemes[0]))
+        picture = long_series(Ladder(record, name, Member(0, 0, schemes[0])))
         return picture, "" if picture is None else drawing.svg(picture.figure, picture.name)
 
 
@@ -114,7 +114,7 @@ def test_a_motion_of_few_samples_has_no_line_between_them(every, is_dotted):
     record = samples.record(exp)
     (member,) = choice.members(record, "theta")
     with style.applied():
-        picture = solution.motion(exp, record, "theta", member)
+        picture = solution.motion(Ladder(record, "theta", member))
     above, below = picture.figure.axes
     exact, *levels = above.get_lines()
     dashes = {line.get_linestyle() for line in [*levels, *below.get_lines()]}
@@ -130,7 +130,7 @@ def test_finer_levels_have_no_lines_between_the_few_points_of_the_coarsest():
     """A level of 64 steps, drawn at nine of them, looked like a motion a third as fast."""
     exp = samples.experiment(model={"kind": "pendulum", "g": 9.81}, levels=[3, 4, 5, 6])
     with style.applied():
-        picture = solution.motion(exp, samples.record(exp), "theta", Member(0, 0, "central"))
+        picture = solution.motion(Ladder(samples.record(exp), "theta", Member(0, 0, "central")))
     _, coarsest, *finer = picture.figure.axes[0].get_lines()
     assert coarsest.get_linestyle() != "None"
     assert {line.get_linestyle() for line in finer} == {"None"}

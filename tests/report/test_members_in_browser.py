@@ -10,7 +10,6 @@ import pytest
 import samples
 
 from vibsim import report
-from vibsim.report import data
 
 pytestmark = pytest.mark.slow
 
@@ -66,8 +65,8 @@ def found(made, tmp_path_factory):
 
 def member(record, case):
     """Return what is told of a member, by its place: its values, its period, its verdict."""
-    period = data.pick(record, "period", scheme=0, case=case, level=-1)
-    reason = data.flags(record, "theta_reason")[0, case]
+    period = record.pick("period", scheme=0, case=case, level=-1)
+    reason = record.flags("theta_reason")[0, case]
     theta, omega = record["initial_theta"][case], record["initial_omega"][case]
     return theta, omega, period, reason
 

@@ -9,7 +9,7 @@ import pytest
 import samples
 
 from vibsim.report import style, words
-from vibsim.report.data import Member
+from vibsim.report.data import Ladder, Member
 from vibsim.report.figures import time as figures_time
 
 TITLE = "Order over time, in windows of half a period"
@@ -29,7 +29,7 @@ def drawn(**changes: Any) -> tuple[Any, Any]:
 def test_the_order_stands_below_the_ratios_with_the_promised_one() -> None:
     _, rec = drawn()
     with style.applied():
-        ax = panel(figures_time.overlay(rec, "theta", Member(0, 0, "central")))
+        ax = panel(figures_time.overlay(Ladder(rec, "theta", Member(0, 0, "central"))))
     labels = ax.get_legend_handles_labels()[1]
     assert labels == ["levels 6, 7, 8", "levels 7, 8, 9", "promised"]
     order = ax.lines[0].get_ydata()
@@ -43,7 +43,7 @@ def test_a_last_point_of_lower_order_is_within_the_frame_and_apart() -> None:
     checks = [{"converges": "omega"}]
     _, rec = drawn(schemes=one_sided, levels=[8, 9, 10, 11], checks=checks)
     with style.applied():
-        ax = panel(figures_time.overlay(rec, "omega", Member(0, 0, "central")))
+        ax = panel(figures_time.overlay(Ladder(rec, "omega", Member(0, 0, "central"))))
     points = [line for line in ax.lines if line.get_marker() == "o"]
     assert len(points) == 2
     low, _ = ax.get_ylim()
@@ -63,7 +63,7 @@ def test_uncertain_places_are_dots_and_what_is_lost_is_a_gap() -> None:
         schemes=schemes, model=model, initial={"u": 1.0}, time=time, levels=[6, 7, 8, 9, 10]
     )
     with style.applied():
-        ax = panel(figures_time.overlay(rec, "u", Member(0, 0, "rk2")))
+        ax = panel(figures_time.overlay(Ladder(rec, "u", Member(0, 0, "rk2"))))
     dots = [line for line in ax.lines if line.get_marker() == "."]
     assert dots
     curves = [line for line in ax.lines if str(line.get_label()).startswith("levels")]
@@ -73,8 +73,8 @@ def test_uncertain_places_are_dots_and_what_is_lost_is_a_gap() -> None:
 def test_where_there_is_no_order_there_is_no_panel() -> None:
     _, rec = drawn(initial={"theta": 0.0})
     with style.applied():
-        assert panel(figures_time.overlay(rec, "theta", Member(0, 0, "central"))) is None
-    assert not figures_time.has_order(rec, "nothing", Member(0, 0, "central"))
+        assert panel(figures_time.overlay(Ladder(rec, "theta", Member(0, 0, "central")))) is None
+    assert not Ladder(rec, "nothing", Member(0, 0, "central")).has("local_order")
 
 
 def test_the_finest_sound_triples_are_chosen() -> None:

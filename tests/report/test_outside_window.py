@@ -11,7 +11,7 @@ from vibsim import Experiment, analyse, simulate, verdicts
 from vibsim.core.record import Record
 from vibsim.core.vocabulary import TYPICAL_NORM
 from vibsim.report import style
-from vibsim.report.data import Member
+from vibsim.report.data import Ladder, Member, Results
 from vibsim.report.figures import time
 from vibsim.report.tables import levels as tables
 
@@ -25,7 +25,7 @@ CONTENT = {
 }
 
 
-def made(levels: range, noise: float = 0.0, **more: Any) -> tuple[Any, Record]:
+def made(levels: range, noise: float = 0.0, **more: Any) -> tuple[Any, Results]:
     """Return verdict and record of a run; `noise` is added to every level."""
     experiment = Experiment.from_dict({**CONTENT, "levels": list(levels), **more})
     random = np.random.default_rng(2)
@@ -37,17 +37,17 @@ def made(levels: range, noise: float = 0.0, **more: Any) -> tuple[Any, Record]:
         data.append(one.assign(u=one["u"] + rough) if noise else one)
     record = analyse(experiment, data)
     (found,) = verdicts(experiment, record)
-    return found, Record.from_xarray(record)
+    return found, Results.of(experiment, Record.from_xarray(record))
 
 
-def notes(record: Record) -> list[str]:
+def notes(record: Results) -> list[str]:
     """Return what the table of levels says of each of them."""
-    return tables._notes(record, "u", Member(0, 0, "central"), TYPICAL_NORM)
+    return tables._notes(Ladder(record, "u", Member(0, 0, "central")), TYPICAL_NORM)
 
 
-def legend(record: Record) -> str:
+def legend(record: Results) -> str:
     with style.applied():
-        figure = time.overlay(record, "u", Member(0, 0, "central")).figure
+        figure = time.overlay(Ladder(record, "u", Member(0, 0, "central"))).figure
     return " ".join(label for ax in figure.axes for label in ax.get_legend_handles_labels()[1])
 
 

@@ -20,7 +20,7 @@ from vibsim.core.errors import VibsimError
 from vibsim.core.record import Record, Variable
 from vibsim.core.vocabulary import REASONS
 from vibsim.report import choice, style
-from vibsim.report.data import Member
+from vibsim.report.data import Ladder, Member
 from vibsim.report.figures import order as figures_order
 from vibsim.report.figures import time
 from vibsim.report.page import cards
@@ -299,7 +299,7 @@ def test_a_ladder_lost_in_round_off_shows_what_is_there(tmp_path):
 @pytest.mark.slow
 def test_uneven_levels_are_rescaled_so_that_they_coincide():
     exp = samples.experiment(levels=[8, 9, 11, 12])
-    curves = time.differences(samples.record(exp), "theta", Member(0, 0, "central"))
+    curves = time.differences(Ladder(samples.record(exp), "theta", Member(0, 0, "central")))
     largest = [np.abs(curve.values).max() for curve in curves]
     np.testing.assert_allclose(largest, largest[-1], rtol=0.01)
     assert [curve.label for curve in curves] == ["θ₈ − θ₉", "3.2 (θ₉ − θ₁₁)", "64 (θ₁₁ − θ₁₂)"]
@@ -368,9 +368,9 @@ TOLERANT = [
 def test_every_promised_order_has_its_reference_and_its_tolerance():
     exp = samples.several(checks=TOLERANT)
     record = promising(samples.record(exp), 2, 1)
-    assert choice.promises(exp, record, "theta") == [(1.0, 0.1), (2.0, 0.3)]
+    assert choice.promises(record, "theta") == [(1.0, 0.1), (2.0, 0.3)]
     with style.applied():
-        text = samples.svg(figures_order.against_step(exp, record, "theta", 0))
+        text = samples.svg(figures_order.against_step(record, "theta", 0))
     assert "slope 1 (promised)" in text
     assert "slope 2 (promised)" in text
 
@@ -378,9 +378,9 @@ def test_every_promised_order_has_its_reference_and_its_tolerance():
 def test_one_promise_of_several_schemes_is_drawn_once():
     exp = samples.several()
     record = samples.record(exp)
-    assert choice.promises(exp, record, "theta") == [(2.0, 0.1)]
+    assert choice.promises(record, "theta") == [(2.0, 0.1)]
     with style.applied():
-        text = samples.svg(figures_order.against_step(exp, record, "theta", 0))
+        text = samples.svg(figures_order.against_step(record, "theta", 0))
     assert text.count(">slope 2 (promised)</text>") == 1
 
 
@@ -407,7 +407,7 @@ def test_a_sweep_shows_every_promise_and_the_map_is_relative_to_it():
 def test_the_rescaled_curves_are_those_that_are_stored():
     exp = samples.experiment(levels=[8, 9, 11, 12])
     record = samples.record(exp)
-    curves = time.differences(record, "theta", Member(0, 0, "central"))
+    curves = time.differences(Ladder(record, "theta", Member(0, 0, "central")))
     np.testing.assert_array_equal([c.values for c in curves], record["theta_rescaled"][0, 0])
 
 
@@ -469,7 +469,7 @@ def test_an_order_that_a_scheme_keeps_is_not_said_to_miss_its_promise(scheme, or
     rec = samples.record(exp)
     (check,) = samples.summary(exp, rec)["checks"]
     assert check["status"] == "FAIL"
-    assert meaning in cards.card(exp, rec, check)["meaning"]
+    assert meaning in cards.card(rec, check)["meaning"]
 
 
 def test_every_reason_has_words():
@@ -493,9 +493,7 @@ def test_a_check_of_stability_does_not_say_that_a_run_stays_bounded(is_stable, t
     asked = {"stable": is_stable}
     exp = samples.experiment(checks=[asked, {"claim": "it is so", "that": asked}], levels=[7])
     record = samples.record(exp)
-    first, claim = (
-        cards.card(exp, record, check) for check in samples.summary(exp, record)["checks"]
-    )
+    first, claim = (cards.card(record, check) for check in samples.summary(exp, record)["checks"])
     assert "an error that vanishes with dt" in first["what"]
     assert "bounded" not in first["what"]
     assert first["what"].startswith("stability" if is_stable else "instability")
@@ -511,7 +509,7 @@ def test_a_refuted_claim_does_not_say_that_the_check_is_right(holds):
     (check,) = samples.summary(exp, record)["checks"]
     assert check["reason"] == "match"
     says = reasons.reason("match", "stable").meaning if holds else reasons.REFUTED
-    assert cards.card(exp, record, check)["meaning"] == says
+    assert cards.card(record, check)["meaning"] == says
 
 
 def test_a_number_within_round_off_has_two_digits():
@@ -530,7 +528,7 @@ def test_a_number_within_round_off_has_two_digits():
     )
     assert re.fullmatch(r"\d\.\d·10⁻¹.", noise)
     assert len(number) > 10
-    asked = [cards.card(exp, record, c)["wanted"] for c in samples.summary(exp, record)["checks"]]
+    asked = [cards.card(record, c)["wanted"] for c in samples.summary(exp, record)["checks"]]
     assert asked == ["conserved up to round-off", "an error that stays bounded"]
 
 
@@ -561,7 +559,7 @@ def test_the_two_frequencies_of_a_stiff_model_have_labels_of_their_own():
         time={"end": 6.0},
         levels=[6, 7],
     )
-    rows = [row for row in setting.setup(exp, samples.record(exp)) if "w dt" in row[0]]
+    rows = [row for row in setting.setup(samples.record(exp)) if "w dt" in row[0]]
     assert [term for term, _ in rows] == ["w dt", "Highest w dt"]
     assert "natural frequency" in rows[0][1]
     assert "fastest oscillation" in rows[1][1]
@@ -587,7 +585,7 @@ def test_many_checks_that_passed_alike_are_a_table_and_the_others_lines():
     others = [{"id": "wrong", "value": "period", "below": 1.0}, {"converges": "theta", "order": 2}]
     exp = samples.experiment(checks=[*checks, *others])
     record = samples.record(exp)
-    made = cards.cards(exp, record, samples.summary(exp, record))
+    made = cards.cards(record, samples.summary(exp, record))
     alone, (group,) = cards.gathered(made, "p3")
     # the one that decides stands alone, and so does what failed
     assert [card["id"] for card in alone] == ["p3", "wrong", "check_9"]

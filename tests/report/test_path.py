@@ -5,7 +5,7 @@ import pytest
 import samples
 
 from vibsim import simulate
-from vibsim.report import choice, data, style, words
+from vibsim.report import choice, style, words
 from vibsim.report.data import Member
 from vibsim.report.figures import gallery, plane
 
@@ -22,8 +22,8 @@ CONTENT = {
 def drawn(**changes):
     exp = samples.experiment(**(CONTENT | changes))
     rec = samples.record(exp)
-    shown, _ = gallery.choose(exp, rec)
-    return exp, rec, shown, plane.path(exp, rec, shown)
+    shown, _ = gallery.choose(rec)
+    return exp, rec, shown, plane.path(rec, shown)
 
 
 @pytest.fixture(scope="module")
@@ -85,9 +85,7 @@ def test_members_are_named_in_words(key, told):
 def test_members_of_a_sweep_have_panels_of_their_own():
     _, rec, shown, picture = drawn(sweep={"model.gamma": [0.0, 0.5]})
     titles = [ax.get_title() for ax in picture.figure.axes]
-    assert titles == [
-        words.swept(data.case_name(rec, case)) for case in sorted({m.case for m in shown})
-    ]
+    assert titles == [words.swept(rec.case_name(case)) for case in sorted({m.case for m in shown})]
 
 
 def test_a_body_at_rest_and_one_coordinate_have_no_path():
@@ -97,7 +95,7 @@ def test_a_body_at_rest_and_one_coordinate_have_no_path():
     checks = [{"converges": "theta", "order": 2, "schemes": ["central"]}]
     exp, _, _, picture = drawn(**one, checks=checks)
     assert picture is None
-    assert choice.position(exp) == "theta"
+    assert exp.model.definition.position == "theta"
 
 
 @pytest.mark.slow
@@ -110,7 +108,7 @@ def test_coordinates_that_move_together_have_no_path(phase, is_drawn):
     )
     record = samples.record(exp)
     with style.applied():
-        picture = plane.path(exp, record, [Member(0, 0, "rk4")])
+        picture = plane.path(record, [Member(0, 0, "rk4")])
     assert (picture is not None) is is_drawn
 
 
@@ -130,10 +128,10 @@ def test_of_many_coordinates_the_one_that_decides_is_drawn_and_no_path():
         checks=[{"converges": "z"}],
     )
     record = samples.record(exp)
-    decisive = choice.find_lead(exp, record, samples.summary(exp, record))
-    shown = gallery.choose(exp, record)[0]
+    decisive = choice.find_lead(record, samples.summary(exp, record))
+    shown = gallery.choose(record)[0]
     with style.applied():
-        found = gallery.pictures(exp, record, shown, decisive, [])
+        found = gallery.pictures(shown, decisive, [])
     names = [picture.name for picture in found.motion]
     assert names == ["motion_z_0_rk4"]
     estimated = dict(found.belief)["estimated error"]

@@ -10,6 +10,7 @@ import pytest
 import samples
 from thinned import thinned
 
+from vibsim.report.data import Results
 from vibsim.report.figures import scenes
 from vibsim.report.page import player
 
@@ -54,11 +55,11 @@ def made(name="pendulum", **changes):
     exp = samples.experiment(
         **({"model": model, "initial": initial, "schemes": [scheme], "checks": []} | changes)
     )
-    return exp, samples.record(exp)
+    return samples.record(exp)
 
 
-def element(exp, record):
-    return player.element(exp, record)
+def element(record):
+    return player.element(record)
 
 
 def data(text):
@@ -75,9 +76,9 @@ def at(lane, look, k):
 
 @pytest.mark.parametrize("name", thinned(MODELS, 2))
 def test_every_system_is_drawn_within_its_frame(name):
-    exp, record = made(name)
-    text, shown = element(exp, record), player.lanes(exp, record)
-    assert text == element(exp, record)
+    record = made(name)
+    text, shown = element(record), player.lanes(record)
+    assert text == element(record)
     assert len(text) < 200_000
     assert not {"NaN", "Infinity"} & set(re.findall(r"\w+", json.dumps(data(text))))
     assert len(data(text)["lanes"]) == len(shown) > 0
@@ -96,8 +97,8 @@ def test_every_system_is_drawn_within_its_frame(name):
 
 @pytest.mark.parametrize("name", ["dragged", "over the top", "physical_pendulum"])
 def test_the_forces_on_a_pendulum_are_those_of_the_model(name):
-    exp, record = made(name)
-    lane = player.lanes(exp, record)[0]
+    record = made(name)
+    lane = player.lanes(record)[0]
     (x, y), motion = (at(lane, "body", k) for k in (0, 1)), lane.motion
     x0, y0 = (at(lane, "pivot", k) for k in (0, 1))
     length = np.hypot(x - x0, y - y0)
@@ -125,8 +126,8 @@ def test_the_forces_on_a_pendulum_are_those_of_the_model(name):
 
 @pytest.mark.parametrize("name", thinned(["dragged", "over the top", "elastic_pendulum"], 3))
 def test_forces_and_angle_are_labelled_and_the_legend_names_what_is_magnified(name):
-    exp, record = made(name)
-    lane = player.lanes(exp, record)[0]
+    record = made(name)
+    lane = player.lanes(record)[0]
     labels = {part.look: part.label for part in lane.scene.parts if part.label}
     assert labels.keys() >= {"angle", "gravity", "pull"}
     told = dict(lane.scene.legend)
@@ -144,8 +145,8 @@ def test_forces_and_angle_are_labelled_and_the_legend_names_what_is_magnified(na
 
 
 def test_the_wheel_stays_on_the_road_and_the_body_where_the_record_says():
-    exp, record = made("vehicle")
-    lane = player.lanes(exp, record)[0]
+    record = made("vehicle")
+    lane = player.lanes(record)[0]
     t, wheel, body = lane.motion.t, at(lane, "wheel", 1), at(lane, "body", 1)
     road = 0.1 * np.sin(2.0 * t)
     scale = np.ptp(wheel) / np.ptp(road)
@@ -157,8 +158,8 @@ def test_the_wheel_stays_on_the_road_and_the_body_where_the_record_says():
 
 
 def test_a_ball_touches_the_ground_at_each_impact_and_never_passes_it():
-    exp, record = made("bouncing_ball", time={"end": 5.0}, levels=[5, 6, 7])
-    lane = player.lanes(exp, record)[0]
+    record = made("bouncing_ball", time={"end": 5.0}, levels=[5, 6, 7])
+    lane = player.lanes(record)[0]
     h = lane.motion.states["h"]
     assert h.min() >= 0.0
     low = (h[1:-1] < h[:-2]) & (h[1:-1] <= h[2:])
@@ -168,11 +169,11 @@ def test_a_ball_touches_the_ground_at_each_impact_and_never_passes_it():
 
 
 def test_a_second_motion_is_shown_where_it_differs_visibly():
-    both = player.lanes(*made(levels=[6, 7, 8, 9], time={"end": 20.0}))
+    both = player.lanes(made(levels=[6, 7, 8, 9], time={"end": 20.0}))
     assert len(both) == 2
     apart = np.abs(both[0].motion.states["theta"] - both[1].motion.states["theta"])
     assert apart.max() > player.VISIBLE
-    assert len(player.lanes(*made(levels=[9, 10, 11], time={"end": 20.0}))) == 1
+    assert len(player.lanes(made(levels=[9, 10, 11], time={"end": 20.0}))) == 1
 
 
 def test_a_long_run_has_a_window_that_moves_and_the_page_says_what_it_leaves_out():
@@ -180,13 +181,13 @@ def test_a_long_run_has_a_window_that_moves_and_the_page_says_what_it_leaves_out
         made("spring", time={"end": end}, levels=levels)
         for end, levels in ((30.0, [9, 10]), (200.0, [11, 12]), (6000.0, [16, 17]))
     )
-    for (exp, record), is_whole, is_cut in ((short, 1, 0), (long, 0, 0), (longer, 0, 1)):
-        text = element(exp, record)
+    for record, is_whole, is_cut in ((short, 1, 0), (long, 0, 0), (longer, 0, 1)):
+        text = element(record)
         found = data(text)
         span = found["t"][1] - found["t"][0]
         assert (found["window"] == pytest.approx(span)) == bool(is_whole)
         assert ("are shown" in text) == bool(is_cut)
-        assert span <= exp.time.end
+        assert span <= record.experiment.time.end
         assert len(text) < 200_000
 
 
@@ -200,14 +201,14 @@ def test_a_long_run_has_a_window_that_moves_and_the_page_says_what_it_leaves_out
     ids=["no displacement", "at rest", "broken down"],
 )
 def test_what_cannot_be_drawn_has_no_player(changes):
-    exp, record = made(**changes)
-    assert element(exp, record) == ""
+    record = made(**changes)
+    assert element(record) == ""
 
 
 def test_a_member_of_a_sweep_is_drawn_with_its_own_parameters():
     sweep = {"model.speed": [1.0, 4.0]}
-    exp, record = made("vehicle", sweep=sweep, time={"end": 10.0})
-    lane = player.lanes(exp, record)[0]
+    record = made("vehicle", sweep=sweep, time={"end": 10.0})
+    lane = player.lanes(record)[0]
     speed = float(lane.motion.parameters["speed"])
     assert f"speed = {speed:g} " in lane.title
     track = next(part for part in lane.scene.parts if part.shape == "track")
@@ -220,23 +221,23 @@ def test_a_member_of_a_sweep_is_drawn_with_its_own_parameters():
 def test_a_run_that_is_shown_whole_is_not_called_cut_where_its_members_differ_in_length():
     sweep = {"model.w": [0.5, 0.7, 1.0, 2.0, 3.0]}
     time = {"periods": 5, "steps_per_period": 2}
-    exp, record = made("spring", sweep=sweep, time=time, levels=[5, 6, 7])
-    text = element(exp, record)
+    record = made("spring", sweep=sweep, time=time, levels=[5, 6, 7])
+    text = element(record)
     assert "w = 2 " in text
     assert "are shown" not in text
 
 
 def test_data_cannot_end_its_script(monkeypatch):
-    exp, record = made()
-    monkeypatch.setattr(player.data, "time_unit", lambda *_: "</script><b>")
-    text = element(exp, record)
+    record = made()
+    monkeypatch.setattr(Results, "time_unit", "</script><b>")
+    text = element(record)
     assert text.count("</script>") == 2
     assert data(text)["unit"] == "</script><b>"
 
 
 def test_a_body_on_a_spring_has_its_dashpot_and_its_force_where_it_has_any():
-    exp, record = made("oscillator")
-    lane = player.lanes(exp, record)[0]
+    record = made("oscillator")
+    lane = player.lanes(record)[0]
     arrow = next(part for part in lane.scene.parts if part.shape == "arrow")
     ratio = arrow.at[2] / np.cos(3.0 * lane.motion.t)
     assert ratio == pytest.approx(scenes.FORCE, rel=1e-6)
@@ -244,8 +245,8 @@ def test_a_body_on_a_spring_has_its_dashpot_and_its_force_where_it_has_any():
     rod = [part for part in lane.scene.parts if part.shape == "line"][-1]
     assert rod.at[2] == pytest.approx(body.at[0] - 18.0)
     assert ("pull", "driving force") in lane.scene.legend
-    exp, record = made("spring")
-    shapes = [part.shape for part in player.lanes(exp, record)[0].scene.parts]
+    record = made("spring")
+    shapes = [part.shape for part in player.lanes(record)[0].scene.parts]
     assert shapes.count("spring") == 1
     assert "arrow" not in shapes
     assert shapes.count("box") == 1
@@ -268,7 +269,7 @@ def test_a_force_from_a_table_has_its_arrow(tmp_path, monkeypatch):
         schemes=["rk4"],
         checks=[],
     )
-    lane = player.lanes(exp, samples.record(exp))[0]
+    lane = player.lanes(samples.record(exp))[0]
     arrow = next(part for part in lane.scene.parts if part.look == "pull")
     # at the points of the table
     heights = arrow.at[2][np.searchsorted(lane.motion.t, [1.0, 2.0, 3.0])]

@@ -14,7 +14,7 @@ MODEL = {"kind": "pendulum", "g": "9.8 m/s^2", "L": "4.9 m"}
 
 
 def rows(experiment):
-    found = contents_scales.table(experiment, samples.record(experiment))
+    found = contents_scales.table(samples.record(experiment))
     assert found is not None
     return {row[0]: row[1:] for row in found.rows}
 
@@ -41,7 +41,7 @@ def test_ranges_over_a_sweep():
 def test_a_model_without_scales_has_no_table():
     model = {"kind": "oscillator", "spring": "u**3"}
     experiment = samples.experiment(model=model, initial={"u": 1.0}, levels=[6, 7])
-    assert contents_scales.table(experiment, samples.record(experiment)) is None
+    assert contents_scales.table(samples.record(experiment)) is None
 
 
 def page(experiment, folder):

@@ -48,10 +48,10 @@ def test_every_figure_of_the_texts_is_on_a_page() -> None:
 
 def drawn(exp: Experiment) -> tuple[list, list[str]]:
     record = samples.record(exp)
-    decisive = choice.find_lead(exp, record, samples.summary(exp, record))
+    decisive = choice.find_lead(record, samples.summary(exp, record))
     with style.applied():
-        found = of_source.pictures(exp, record, decisive)
-    has_player = bool(player.element(exp, record))
+        found = of_source.pictures(decisive)
+    has_player = bool(player.element(record))
     return found, of_source.undrawn(found, has_player=has_player)
 
 

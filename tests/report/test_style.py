@@ -14,7 +14,7 @@ from matplotlib.colors import to_rgb
 
 from vibsim import report
 from vibsim.report import style
-from vibsim.report.data import Member
+from vibsim.report.data import Ladder, Member
 from vibsim.report.evidence import frame
 from vibsim.report.figures import drawing, panels, time
 from vibsim.report.page.templates import TEMPLATES
@@ -104,7 +104,8 @@ def documents():
     record = samples.record(exp)
     with style.applied():
         return [
-            samples.svg(time.overlay(record, "theta", Member(0, 0, "central"))) for _ in range(2)
+            samples.svg(time.overlay(Ladder(record, "theta", Member(0, 0, "central"))))
+            for _ in range(2)
         ]
 
 
@@ -168,7 +169,7 @@ def test_a_name_with_markup_stays_text_in_a_figure():
     with style.applied():
         from vibsim.report.figures import order
 
-        text = samples.svg(order.against_step(exp, record, "theta", 0))
+        text = samples.svg(order.against_step(record, "theta", 0))
     assert "<script" not in text
     ElementTree.fromstring(text)
 

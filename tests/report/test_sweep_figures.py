@@ -14,7 +14,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from vibsim import report
-from vibsim.core.record import Record, Variable
+from vibsim.core.record import Variable
 from vibsim.core.vocabulary import REASONS
 from vibsim.models import MODELS
 from vibsim.report import choice, data, finest_level, style, sweep_layout
@@ -168,7 +168,7 @@ def test_the_estimated_error_of_the_finest_level_is_the_true_one(across):
     ratio = (error.estimate / error.true)[passed]
     # the next term of the expansion is smaller by the distance of the order from 2, at most 0.1, times log 2 * 4/3
     assert np.all(np.abs(ratio - 1.0) < 0.1)
-    period = finest_level.measured(record, "period", "theta")
+    period = finest_level.measured(record, "period")
     true = np.abs(period.value - record["exact_period"])[passed]
     assert np.median(np.abs(period.error[passed] / true - 1.0)) < 0.1
 
@@ -387,7 +387,7 @@ def test_an_order_of_a_part_is_promised_where_theory_has_one(model, order, word)
     entries = swept.figure.axes[0].get_legend_handles_labels()[1]
     assert f"{word}, {3 if order == 3 else 2} ± 0.1" in entries
     other = {"promised": "expected", "expected": "promised"}[word]
-    for picture in (swept, figures_order.against_step(exp, record, part, 0)):
+    for picture in (swept, figures_order.against_step(record, part, 0)):
         assert word in picture.caption
         assert other not in picture.caption
 
@@ -397,7 +397,7 @@ def test_what_is_the_same_for_all_members_is_not_drawn():
     exp = samples.experiment(model={"kind": "linear_pendulum"}, sweep=sweep, levels=[8, 9, 10])
     record = samples.record(exp)
     # the period depends on g, the amplitude of a linear pendulum does not
-    record = Record(record.coords, record.variables | {"amplitude": constant(record)}, record.attrs)
+    record = replace(record, variables=record.variables | {"amplitude": constant(record)})
     views, told = samples.views(exp, record, "theta")
     assert [view.name for view in views.values()] == [
         "period", "error of the period", "order of θ", "error of θ",
@@ -444,7 +444,7 @@ def test_what_a_page_holds_of_a_member_is_where_it_is_drawn(sweep):
     exp = samples.experiment(sweep=sweep)
     record = samples.record(exp)
     views, _ = samples.views(exp, record, "theta")
-    found = explorer.content(exp, record, list(views.values()))
+    found = explorer.content(record, list(views.values()))
     json.dumps(found, allow_nan=False)
     start, end = found["command"]
     assert (start, end) == (".venv/bin/vibsim run pendulum_lab/theta@", "")
@@ -466,9 +466,7 @@ def test_what_a_page_holds_of_a_member_is_where_it_is_drawn(sweep):
             assert drawn_at(ax, (found["keys"][across]["values"][case], high)), name
     verdicts = found["verdicts"]["theta"]
     words = [verdicts["texts"][i] for i in verdicts["of"][0]]
-    assert words == [
-        f"{REASONS[reason]} ({reason})" for reason in data.flags(record, "theta_reason")[0]
-    ]
+    assert words == [f"{REASONS[reason]} ({reason})" for reason in record.flags("theta_reason")[0]]
 
 
 def test_of_many_members_an_even_part_can_be_pointed_at_and_the_worst():
@@ -537,12 +535,12 @@ def test_both_ways_of_a_followed_path_are_in_the_legends():
         sweep={"follow": "model.omega", "model.omega": [1.0, 1.1, 1.2, 1.1, 1.0]},
     )  # fmt: skip
     record = samples.record(exp)
-    lead = choice.find_lead(exp, record, {"checks": []})
-    ways = [data.case_name(record, case).partition(" on the ")[2] for case in range(5)]
+    lead = choice.find_lead(record, {"checks": []})
+    ways = [record.case_name(case).partition(" on the ")[2] for case in range(5)]
     assert ways == ["way up", "way up", "", "way down", "way down"]
     with style.applied():
         drawn = [
-            hero.response(exp, record, lead),
+            hero.response(lead),
             *(v.picture for v in samples.views(exp, record, "u")[0].values()),
         ]
         for picture in drawn:

@@ -12,7 +12,8 @@ import samples
 
 from vibsim import report
 from vibsim.models import MODELS
-from vibsim.report import choice, data, style, words
+from vibsim.report import choice, style, words
+from vibsim.report.data import Ladder
 from vibsim.report.figures import energy as figures_energy
 from vibsim.report.figures import extrema, gallery
 from vibsim.report.figures import plane as figures_plane
@@ -83,7 +84,7 @@ def write(directory, exp, rec, summary):
 @pytest.mark.usefixtures("without_pictures")
 def test_printed_digits_stand_beside_ours(text, tmp_path):
     exp, rec, summary = text
-    (table,) = published.tables(exp, rec, summary)
+    (table,) = published.tables(rec, summary)
     assert column(table, "printed") == [row["printed"] for row in PRINTED["rows"]]
     agrees = [abs(ours - row.meaning.number) <= row.meaning.half_unit for ours, row in
               zip(column(table, "ours"), exp.published[0].rows, strict=True)]  # fmt: skip
@@ -215,7 +216,7 @@ def test_a_further_number_by_the_own_velocity_says_so(tmp_path):
     }
     exp = spring(published=[table])
     rec = samples.record(exp)
-    (found,) = published.tables(exp, rec, samples.summary(exp, rec))
+    (found,) = published.tables(rec, samples.summary(exp, rec))
     assert [c.header for c in found.columns][-2:] == ["by own velocity", "beside: period"]
 
 
@@ -227,13 +228,13 @@ def test_the_centred_scheme_alone_has_no_second_energy():
 
 @pytest.mark.slow
 def test_every_scheme_has_a_look_of_its_own_and_one_legend_entry(everything):
-    exp, rec = everything
+    _, rec = everything
     looks = [str(style.look(i)) for i in range(len(rec["scheme"]))]
     assert len(set(looks)) == len(looks)
-    picture = figures_theory.order_and_stability(exp, rec)
+    picture = figures_theory.order_and_stability(rec)
     texts = [t.get_text() for t in picture.figure.axes[0].get_legend().get_texts()]
     assert texts == rec.words("scheme")
-    assert len(contents_theory.schemes(exp, rec).rows) == len(texts)
+    assert len(contents_theory.schemes(rec).rows) == len(texts)
 
 
 @pytest.mark.slow
@@ -243,7 +244,7 @@ def test_a_page_of_all_schemes_is_small_and_folds_long_tables(everything, tmp_pa
     assert len(page) < 2_000_000
     shown = re.sub(r"<details.*?</details>", "", page, flags=re.DOTALL)
     assert shown.count("<tr") < 80
-    drawn, _ = gallery.choose(exp, rec)
+    drawn, _ = gallery.choose(rec)
     assert len(drawn) == gallery.MOST_SHOWN // 2
 
 
@@ -253,15 +254,15 @@ def test_adaptive_schemes_have_their_place_in_work_alone(tmp_path):
     adaptive = {"kind": "dop853", "tolerance": [1e-8, 1e-4]}
     exp = spring(schemes=["central", "rk4", adaptive])
     rec = samples.record(exp)
-    lines = {line.name: line for line in figures_work.lines(exp, rec, 0)}
+    lines = {line.name: line for line in figures_work.lines(rec, 0)}
     assert lines["dop853"].labels == ("tolerance 0.0001", "tolerance 1e-08")
     assert lines["dop853"].error[0] > lines["dop853"].error[1]
     np.testing.assert_array_equal(lines["rk4"].work[1], 4 * lines["rk4"].work[0])
-    assert figures_work.precision(exp, rec, 0) is not None
-    theory = figures_theory.order_and_stability(exp, rec)
+    assert figures_work.precision(rec, 0) is not None
+    theory = figures_theory.order_and_stability(rec)
     texts = [t.get_text() for t in theory.figure.axes[0].get_legend().get_texts()]
     assert texts == ["central", "rk4"]
-    assert {m.scheme_name for m in gallery.choose(exp, rec)[0]} == {"central", "rk4"}
+    assert {m.scheme_name for m in gallery.choose(rec)[0]} == {"central", "rk4"}
     write(tmp_path, exp, rec, samples.summary(exp, rec))
 
 
@@ -270,18 +271,18 @@ def test_runs_beyond_the_limit_show_predicted_and_measured_growth():
         schemes=["central", "crank_nicolson"], time={"end": 10.0, "base_steps": 31}, levels=[0, 1]
     )
     rec = samples.record(exp)
-    picture = figures_theory.growing(exp, rec)
+    picture = figures_theory.growing(rec)
     (entry,) = [t.get_text() for t in picture.figure.axes[0].get_legend().get_texts()]
     assert words.number(float(rec["theory_growth"][0, 0, 0])) in entry
     assert words.number(float(rec["measured_growth"][0, 0, 0])) in entry
-    assert figures_theory.growing(exp, samples.record(spring(schemes=["central"]))) is None
+    assert figures_theory.growing(samples.record(spring(schemes=["central"]))) is None
 
 
 @pytest.mark.parametrize(("u", "v"), [(1.0, 0.0), (-1.0, 0.0), (0.0, 1.0), (1.0, -3.0)])
 def test_the_first_peak_is_that_of_the_exact_solution(u, v):
     exp = spring(initial={"u": u, "v": v}, schemes=["gauss4"], levels=[2, 3])
     rec = samples.record(exp)
-    expected = extrema.first_peak(exp, rec, 0, 1.0)
+    expected = extrema.first_peak(rec, 0, 1.0)
     assert float(rec["peak_time"][0, 0, -1, 0]) == pytest.approx(expected, abs=1e-4)
 
 
@@ -292,13 +293,13 @@ def test_local_amplitudes_are_half_the_height_to_the_next_trough():
 
 
 def test_levels_of_the_phase_plane_are_those_that_were_computed(text):
-    exp, rec, _ = text
+    _, rec, _ = text
     member = choice.members(rec, "u")[2]
     model = MODELS["spring"]
-    values = data.state_at(rec, model.position, member, 0)
+    values = Ladder(rec, model.position, member).on_level(0)
     error = rec["u_exact"][0] - values
     np.testing.assert_allclose(error, rec["u_error"][2, 0, 0], atol=1e-13)
-    picture = figures_plane.phase(exp, rec, choice.members(rec, "u"))
+    picture = figures_plane.phase(rec, choice.members(rec, "u"))
     assert len(picture.figure.axes) == 3
     assert all(ax.get_aspect() == 1.0 for ax in picture.figure.axes)
 
@@ -326,7 +327,7 @@ def test_an_exact_orbit_that_does_not_close_is_drawn_as_far_as_the_levels(model,
         schemes=["rk4"],
     )
     rec = samples.record(exp)
-    picture = figures_plane.phase(exp, rec, choice.members(rec, u))
+    picture = figures_plane.phase(rec, choice.members(rec, u))
     exact, *levels = picture.figure.axes[0].get_lines()
     ends = [line.get_xdata()[-1] for line in (exact, levels[-1])]
     assert (abs(ends[0] - ends[1]) < 0.01) == (not closes)

@@ -19,8 +19,8 @@ SVG = "{http://www.w3.org/2000/svg}"
 def drawn(exp, record=None):
     """Return the kind of a picture, and the points of each of its paths, shape (n, 2)."""
     record = record or samples.record(exp)
-    text = thumbnail.thumbnail(exp, record, Member(0, 0, "central"))
-    assert text == thumbnail.thumbnail(exp, record, Member(0, 0, "central"))
+    text = thumbnail.thumbnail(record, Member(0, 0, "central"))
+    assert text == thumbnail.thumbnail(record, Member(0, 0, "central"))
     assert len(text) < 12_000
     assert not re.search(r"\b(?:nan|inf)\b", text)
     group = ElementTree.fromstring(text).find(f"{SVG}g")
@@ -53,7 +53,7 @@ def test_both_ways_of_a_path_have_the_colours_of_the_page():
         time={"periods": 4, "steps_per_period": 16, "frequency": "model.omega"}, schemes=["rk4"], checks=[],
         sweep={"follow": "model.omega", "model.omega": [*np.linspace(1, 2, 9).tolist(), 1.5]},
     )  # fmt: skip
-    text = thumbnail.thumbnail(exp, samples.record(exp), Member(0, 0, "rk4"))
+    text = thumbnail.thumbnail(samples.record(exp), Member(0, 0, "rk4"))
     points = {name: d.count("L") for name, d in re.findall(r'class="(c\d)" d="([^"]*)"', text)}
     assert points == {"c0": 8, "c1": 1}
     assert ".c0{stroke:#0072b2}" in text

@@ -11,10 +11,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from vibsim.core.array_types import Flags, Floats
-from vibsim.core.record import Record
 from vibsim.core.vocabulary import MEMBER
-from vibsim.report import data
-from vibsim.report.data import Member, formal_orders, optional, whole
+from vibsim.report.data import Ladder, Results
 from vibsim.report.style import finite, no_zeros
 
 LAST_PART = 4
@@ -60,65 +58,67 @@ class Error:
         return np.where(np.isfinite(self.true), self.true, self.estimate)
 
 
-def error(record: Record, quantity: str) -> Error:
+def error(record: Results, quantity: str) -> Error:
     """Return the error of a quantity at the finest level, in the typical norm."""
     true = true_error(record, quantity)
-    if not whole(record, "pair"):
+    if not record.pairs:
         nothing = np.full_like(true, np.nan)
         return Error(true, nothing, nothing, nothing)
-    last = data.pick(record, f"{quantity}_difference_norm", pair=-1)
-    order, low, high = data.orders(record, quantity)
-    stated = np.where(np.isfinite(order), order, formal_orders(record, quantity))
+    last = record.pick(f"{quantity}_difference_norm", pair=-1)
+    order, low, high = record.orders(quantity)
+    stated = np.where(np.isfinite(order), order, record.formal_orders(quantity))
     return Error(true, *(last * _error_fraction(record, p) for p in (stated, high, low)))
 
 
-def true_error(record: Record, quantity: str) -> Floats:
+def true_error(record: Results, quantity: str) -> Floats:
     """Return the norm of the true error of the finest level, shape (scheme, case); NaN without an exact solution."""
-    return optional(record, f"{quantity}_error_norm", MEMBER, level=-1)
+    return record.optional(f"{quantity}_error_norm", MEMBER, level=-1)
 
 
-def norms(record: Record, quantity: str, member: Member) -> Floats:
+def norms(ladder: Ladder) -> Floats:
     """Return the true error of a member at every level, or the differences of its levels if it is unknown."""
 
     def norm(name: str) -> Floats:
-        return no_zeros(data.at(record, f"{quantity}_{name}_norm", member))
+        return no_zeros(ladder.at(f"{name}_norm"))
 
-    is_known = np.isfinite(norm("error")).any() or not whole(record, "pair")
+    is_known = np.isfinite(norm("error")).any() or not ladder.record.pairs
     return norm("error") if is_known else np.append(norm("difference"), np.nan)
 
 
-def deviation(record: Record, quantity: str) -> Floats:
+def deviation(record: Results, quantity: str) -> Floats:
     """Return the order, stated or estimated, minus the formal one, shape (scheme, case)."""
-    return np.asarray(data.orders(record, quantity)[0] - formal_orders(record, quantity))
+    return np.asarray(record.orders(quantity)[0] - record.formal_orders(quantity))
 
 
-def _error_fraction(record: Record, order: Floats) -> Floats:
+def _error_fraction(record: Results, order: Floats) -> Floats:
     """Return the error of the finest level as a fraction of its difference from the next coarser one."""
-    levels = whole(record, "level")
+    levels = record.levels
     with np.errstate(divide="ignore", over="ignore"):
         ratio = 2.0 ** (order * (levels[-1] - levels[-2])) - 1.0
         return np.where(ratio > 0.0, 1.0 / ratio, np.where(np.isnan(ratio), np.nan, np.inf))
 
 
-def measured(record: Record, name: str, position: str) -> Measured:
+def measured(record: Results, name: str) -> Measured:
     """Return the size of the ``period`` or ``amplitude``, whose sign is arbitrary if a run grows without bound."""
-    value = np.abs(optional(record, name, MEMBER, level=-1))
+    value = np.abs(record.optional(name, MEMBER, level=-1))
     error = np.full(value.shape, np.nan)
-    if whole(record, "pair"):
-        coarser = np.abs(optional(record, name, MEMBER, level=-2))
-        error = np.abs(value - coarser) * _error_fraction(record, formal_orders(record, position))
-    return Measured(name, data.unit(record, name), value, error)
+    if record.pairs:
+        coarser = np.abs(record.optional(name, MEMBER, level=-2))
+        order = record.formal_orders(record.model.position)
+        error = np.abs(value - coarser) * _error_fraction(record, order)
+    return Measured(name, record.unit(name), value, error)
 
 
-def unsettled(record: Record, position: str) -> Flags:
+def unsettled(record: Results) -> Flags:
     """Return which members still swing further than their amplitude says, shape (scheme, case).
 
     Their motion has several frequencies, or has not yet decayed. Without stored series nothing is known.
     """
-    size = np.abs(optional(record, "amplitude", MEMBER, level=-1))
-    if f"{position}_finest" not in record:
+    name = f"{record.model.position}_finest"
+    size = np.abs(record.optional("amplitude", MEMBER, level=-1))
+    if name not in record:
         return np.zeros(size.shape, np.bool_)
-    series = np.asarray(record[f"{position}_finest"], dtype=np.float64)
+    series = np.asarray(record[name], dtype=np.float64)
     late = series[..., -(series.shape[-1] // LAST_PART) :]
     return np.asarray(0.5 * np.ptp(late, axis=-1) > (1.0 + SETTLED) * size)
 
@@ -129,9 +129,9 @@ def varies(values: Floats) -> bool:
     return sizes.size > 1 and bool(np.ptp(sizes) > VARIES * sizes.max())
 
 
-def period_error(record: Record, level: int) -> Floats:
+def period_error(record: Results, level: int) -> Floats:
     """Return the relative error of the period at a position of `level`, shape (scheme, case); NaN if unknown."""
-    period, exact = optional(record, "period", MEMBER, level=level), data.exact_periods(record)
+    period, exact = record.optional("period", MEMBER, level=level), record.exact_periods
     with np.errstate(invalid="ignore", divide="ignore"):
         # on the separatrix the exact period is infinite
         return np.asarray(np.where(np.isinf(exact), np.nan, np.abs(period / exact - 1.0)))

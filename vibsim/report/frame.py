@@ -9,10 +9,9 @@ import numpy as np
 
 from vibsim.convergence.thresholds import ABOVE_ROUND_OFF
 from vibsim.core.array_types import Flags, Floats
-from vibsim.core.record import Record
 from vibsim.core.vocabulary import MEMBER, OF_LEVEL, TYPICAL_NORM
 from vibsim.report import data
-from vibsim.report.data import Member, optional
+from vibsim.report.data import Ladder, Results
 from vibsim.report.style import positive
 from vibsim.report.types import Axes
 
@@ -27,21 +26,21 @@ LOOKS_ALIKE = 0.004  # curves closer than this fraction of the frame's height lo
 LEAVING = "Triangles at an edge: values beyond the frame."  # for captions
 
 
-def sizes(record: Record, quantity: str) -> Floats:
+def sizes(record: Results, quantity: str) -> Floats:
     """Return the size of a quantity in the motion of every member, shape (case,); NaN if unknown.
 
     It is the size of the exact solution, else the smallest over all schemes and levels: the others may have grown.
     """
-    count = len(record["case"])
+    count = record.count
     if f"{quantity}_exact" in record and "t" in record:
         variable = record.variable(f"{quantity}_exact")
         others = tuple(i for i, dim in enumerate(variable.dims) if dim != "case")
         exact = np.max(np.abs(np.asarray(variable.values, dtype=np.float64)), axis=others)
         return positive(np.broadcast_to(exact, (count,)))
     if quantity.startswith("energy") and "energy_initial" in record:
-        size = np.abs(optional(record, "energy_initial", MEMBER))
+        size = np.abs(record.optional("energy_initial", MEMBER))
     elif f"{quantity}_max" in record:
-        ends = [np.abs(optional(record, f"{quantity}_{end}", OF_LEVEL)) for end in ("min", "max")]
+        ends = [np.abs(record.optional(f"{quantity}_{end}", OF_LEVEL)) for end in ("min", "max")]
         size = np.swapaxes(np.maximum(*ends), 1, 2).reshape(-1, count)
     else:
         return np.full(count, np.nan)
@@ -54,21 +53,19 @@ def is_bounded(values: Floats, size: Floats) -> Flags:
         return np.isfinite(values) & ~(np.abs(values) > UNBOUNDED * size)
 
 
-def why_lost(
-    record: Record, quantity: str, member: Member, levels: list[int], values: Floats
-) -> str:
+def why_lost(ladder: Ladder, levels: list[int], values: Floats) -> str:
     """Say why values that come from `levels` (positions) mean nothing; round-off only if they are near its floor."""
-    status = np.asarray(data.pick(record, "status", scheme=member.scheme, case=member.case))
+    status = np.asarray(ladder.record.pick("status", scheme=ladder.scheme, case=ladder.case))
     if np.any(status[levels] != 0):
         return BROKE_DOWN
-    size = float(sizes(record, quantity)[member.case])
+    size = float(sizes(ladder.record, ladder.quantity)[ladder.case])
     if math.isfinite(size) and data.largest(values) > UNBOUNDED * size:
         return GROWS
-    pairs = [i for i in levels if i < len(data.whole(record, "pair"))]
+    pairs = [i for i in levels if i < len(ladder.record.pairs)]
     if not pairs:
         return NO_VALUE
-    difference = float(data.at(record, f"{quantity}_difference_norm", member)[pairs[-1]])
-    floor = data.floor_norm(record, quantity, member, TYPICAL_NORM)
+    difference = float(ladder.at("difference_norm")[pairs[-1]])
+    floor = ladder.floor(TYPICAL_NORM)
     if math.isnan(difference):
         return NO_VALUE
     return ROUND_OFF if difference <= ABOVE_ROUND_OFF * data.largest(floor[levels]) else UNLIKE

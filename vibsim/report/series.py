@@ -7,109 +7,81 @@ from collections.abc import Mapping
 import numpy as np
 
 from vibsim.core.array_types import Floats
-from vibsim.core.record import Record
 from vibsim.formula import values
 from vibsim.models.base import Formula, Model, tree
-from vibsim.report import data
-from vibsim.report.data import Member, pretty_unit
-from vibsim.report.types import Experiment
+from vibsim.report.data import Ladder, Results, pretty_unit
 from vibsim.simulation.members import members
 
 ENERGIES = ("energy", "kinetic_energy", "potential_energy")
 SMOOTH = 700  # points of an exact solution: few enough, with its gaps, that thinning removes none
 
 
-def numbers_of(
-    experiment: Experiment, record: Record, case: int
-) -> tuple[dict[str, Floats], dict[str, Floats]]:
+def numbers_of(record: Results, case: int) -> tuple[dict[str, Floats], dict[str, Floats]]:
     """Return the parameters, by their keys in the file, and the initial values of the member at position `case`."""
     index = int(record["case"][case])
-    member = members(experiment, index, index + 1)
-    parameters, initial = (
-        {name: column[0] for name, column in columns.items()}
-        for columns in (member.parameters, member.initial)
-    )
-    return parameters, initial
+    one = members(record.experiment, index, index + 1)
+    parameters = {name: column[0] for name, column in one.parameters.items()}
+    return parameters, {name: column[0] for name, column in one.initial.items()}
 
 
-def parameters_of(experiment: Experiment, record: Record, case: int) -> dict[str, Floats]:
+def parameters_of(record: Results, case: int) -> dict[str, Floats]:
     """Return the parameters of a member by their names in formulas."""
-    by_key, _ = numbers_of(experiment, record, case)
-    return {row.name: by_key[row.key] for row in experiment.model.definition.parameters}
+    by_key, _ = numbers_of(record, case)
+    return {row.name: by_key[row.key] for row in record.model.parameters}
 
 
-def on_level(
-    experiment: Experiment, record: Record, quantity: str, member: Member, level: int
-) -> Floats | None:
+def on_level(ladder: Ladder, level: int) -> Floats | None:
     """Return a quantity on a level at the common times, shape (t,); None if it is neither stored nor computable.
 
     `level` is a position. A quantity that the record lacks is computed from the states by its formula.
     """
-    if f"{quantity}_finest" in record:
-        return data.state_at(record, quantity, member, level)
-    model = experiment.model.definition
-    names = [state.name for state in model.states]
-    if any(f"{name}_finest" not in record for name in names):
+    if "finest" in ladder:
+        return ladder.on_level(level)
+    states = [ladder.of(state.name) for state in ladder.record.model.states]
+    if any("finest" not in state for state in states):
         return None
-    states = {name: data.state_at(record, name, member, level) for name in names}
-    return _derived(experiment, record, quantity, member, states, data.times(record, member.case))
+    return _derived(ladder, {one.quantity: one.on_level(level) for one in states}, ladder.t)
 
 
-def exact(
-    experiment: Experiment, record: Record, quantity: str, member: Member, t: Floats
-) -> Floats | None:
+def exact(ladder: Ladder, t: Floats) -> Floats | None:
     """Return the exact solution at any times; None if the model has none in closed form."""
-    model = experiment.model.definition
+    model = ladder.record.model
     if model.exact is None:
         return None
-    parameters, initial = numbers_of(experiment, record, member.case)
+    parameters, initial = numbers_of(ladder.record, ladder.case)
     states = model.exact(t, initial, parameters)
-    if quantity in states:
-        return np.asarray(states[quantity])
-    return _derived(experiment, record, quantity, member, states, t)
+    if ladder.quantity in states:
+        return np.asarray(states[ladder.quantity])
+    return _derived(ladder, states, t)
 
 
-def name_of_exact(experiment: Experiment) -> str:
-    """Return ``exact`` for a solution in closed form, ``reference`` for one that was computed."""
-    return "reference" if experiment.model.definition.exact is None else "exact"
-
-
-def exact_curve(
-    experiment: Experiment, record: Record, quantity: str, member: Member, end: float = np.inf, start: float = 0.0
-) -> tuple[Floats, Floats]:  # fmt: skip
+def exact_curve(ladder: Ladder, end: float = np.inf, start: float = 0.0) -> tuple[Floats, Floats]:
     """Return times and values of the exact solution between two times, on a finer grid if the common times are few.
 
     So the curve is smooth even if a level has few points in a period. It has a gap where an impact makes a velocity
     jump. If only a reference is known, its times are the common ones.
     """
-    t = data.times(record, member.case)
+    t = ladder.t
     there = (t >= start) & (t <= end * (1.0 + 1e-12))
     is_fine = int(there.sum()) > SMOOTH
     fine = t[there] if is_fine else np.linspace(max(start, t[0]), min(end, t[-1]), SMOOTH)
-    best = exact(experiment, record, quantity, member, fine)
+    best = exact(ladder, fine)
     if best is None or not np.isfinite(best).any():
-        return t[there], data.exact_series(record, quantity, member)[there]
-    model = experiment.model.definition
-    if model.events is not None and quantity in model.events.changed(model.velocities):
+        return t[there], ladder.exact[there]
+    model = ladder.record.model
+    if model.events is not None and ladder.quantity in model.events.changed(model.velocities):
         rises = np.flatnonzero((best[:-1] < 0.0) & (best[1:] >= 0.0))
         fine, best = np.insert(fine, rises + 1, fine[rises]), np.insert(best, rises + 1, np.nan)
     return fine, best
 
 
-def _derived(
-    experiment: Experiment,
-    record: Record,
-    quantity: str,
-    member: Member,
-    states: Mapping[str, Floats],
-    t: Floats,
-) -> Floats | None:
+def _derived(ladder: Ladder, states: Mapping[str, Floats], t: Floats) -> Floats | None:
     """Compute an energy or an output of the model from its states."""
-    model = experiment.model.definition
-    numbers = {**parameters_of(experiment, record, member.case), **states, "t": t}
+    model = ladder.record.model
+    numbers = {**parameters_of(ladder.record, ladder.case), **states, "t": t}
     terms = [
         np.broadcast_to(values(tree(model, formula), numbers), t.shape)
-        for formula in _formulas(model, quantity)
+        for formula in _formulas(model, ladder.quantity)
     ]
     return np.sum(terms, axis=0) if terms else None
 
@@ -127,11 +99,11 @@ def _formulas(model: Model, quantity: str) -> list[Formula]:
     return [] if formula is None else [formula]
 
 
-def unit_of(experiment: Experiment, record: Record, quantity: str) -> str:
+def unit_of(ladder: Ladder) -> str:
     """Return the unit of a quantity; empty if it has none."""
-    if f"{quantity}_finest" in record:
-        return data.unit(record, f"{quantity}_finest")
-    model = experiment.model.definition
+    model, quantity = ladder.record.model, ladder.quantity
+    if "finest" in ladder:
+        return ladder.unit()
     rows = {state.name: state.unit for state in model.states}
     rows |= {output.name: output.unit for output in model.outputs}
     return pretty_unit(rows.get(quantity, model.energy_unit if quantity in ENERGIES else "1"))

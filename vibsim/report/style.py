@@ -16,7 +16,6 @@ from typing import Any
 import numpy as np
 
 from vibsim.core.array_types import Floats
-from vibsim.core.record import Record
 from vibsim.report.types import Axes, Figure
 from vibsim.report.words import number, power
 
@@ -143,11 +142,6 @@ def look(i: int) -> dict[str, Any]:
         "linestyle": DASHES[(i + turn) % count],
         "marker": MARKERS[(i + 2 * turn) % count],
     }
-
-
-def crowded(record: Record) -> bool:
-    """Return whether a record has more schemes than colours, so that all panels share one legend."""
-    return len(record["scheme"]) > MANY
 
 
 def thin(t: Floats, y: Floats, width: int = THINNED_POINTS) -> tuple[Floats, Floats]:

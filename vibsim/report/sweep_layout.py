@@ -14,11 +14,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vibsim.core.array_types import Floats
-from vibsim.core.record import Record
 from vibsim.report import words
-from vibsim.report.data import bin_of, swept, swept_label
+from vibsim.report.data import Results, bin_of
 from vibsim.report.style import LOG_RATIO, label
-from vibsim.report.types import Experiment
 
 LARGEST_TO_SCALE = 1e100  # larger swept values are not drawn to scale
 FEW, LINES = 5, 6
@@ -59,13 +57,13 @@ class Key:
         return self.words[int(value)] if self.words else words.number(value, "step")
 
 
-def keys(record: Record) -> list[Key]:
+def keys(record: Results) -> list[Key]:
     """Return the swept keys with more than one value, in the order of the experiment file."""
-    return [key for name in swept(record) if (key := _key(record, name)).distinct.size > 1]
+    return [key for name in record.swept if (key := _key(record, name)).distinct.size > 1]
 
 
-def _key(record: Record, name: str) -> Key:
-    key, unit = swept_label(record, name)
+def _key(record: Results, name: str) -> Key:
+    key, unit = record.swept_label(name)
     values = np.asarray(record[name])
     if np.issubdtype(values.dtype, np.number):
         numbers = np.asarray(values, dtype=np.float64)
@@ -171,9 +169,9 @@ def bins(key: Key, count: int) -> Floats:
     return np.asarray((np.geomspace if key.is_log else np.linspace)(low, high, count + 1))
 
 
-def layout_of(experiment: Experiment, record: Record) -> Along | Grid | None:
+def layout_of(record: Results) -> Along | Grid | None:
     """Return the arrangement of the members of a sweep; None for a cloud, or if no key varies."""
-    varying, sweep = keys(record), experiment.sweep
+    varying, sweep = keys(record), record.experiment.sweep
     return along_of(varying, sweep.follow if sweep is not None else None) or grid_of(varying)
 
 

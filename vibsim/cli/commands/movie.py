@@ -100,6 +100,7 @@ def _fps(options: Namespace, form: str) -> float:
 
 def _film(plan: Plan, options: Namespace, form: str) -> Film:
     """Return the film of the chosen runs; by default the finest level, and a coarse run if it differs visibly."""
+    from vibsim.report.data import Results
     from vibsim.report.movie import film
 
     if plan.has_solver:
@@ -115,24 +116,29 @@ def _film(plan: Plan, options: Namespace, form: str) -> Film:
             problem = f"level {level} is not made yet: {called(command_to_run(options.experiment))}"
             raise VibsimError(f"{plan.key}: {problem}")
     wanted_levels = options.level or [made[-1]]
-    records = {level: level_member.of_level(plan, results, level, case) for level in wanted_levels}
+
+    def read(level: int) -> Results:
+        found = level_member.of_level(plan, results, level, case)
+        return Results.of(plan.experiment, found)
+
+    records = {level: read(level) for level in wanted_levels}
     record = records[wanted_levels[0]]
     names = level_member.series(record)
     if not names:
         hint = f"run one member alone: {called(command_to_run(f'{options.experiment}@{case}'))}"
         raise VibsimError(f"{plan.key}: there are no series over time to be shown; {hint}")
-    schemes = [chosen("--scheme", s, record.words("scheme")) for s in options.scheme or [None]]
+    schemes = [chosen("--scheme", s, record.schemes) for s in options.scheme or [None]]
     position = plan.experiment.model.definition.position
     wanted = options.quantity or (position if position in names else None)
     quantity = chosen("--quantity", wanted, names)
 
     def run(level: int, scheme: str) -> Run:
-        return film.run(plan.experiment, records[level], scheme, quantity)
+        return film.run(records[level], scheme, quantity)
 
     runs = [run(*pair) for pair in _pairs(wanted_levels, schemes)]
     if not (options.level or options.scheme) and len(made) > 1:
-        records[made[0]] = level_member.of_level(plan, results, made[0], case)
-        coarse = [run(made[0], scheme) for scheme in record.words("scheme")]
+        records[made[0]] = read(made[0])
+        coarse = [run(made[0], scheme) for scheme in record.schemes]
         other = max(coarse, key=lambda candidate: film.differs_visibly(candidate, runs[0]))
         runs += [other] if film.differs_visibly(other, runs[0]) else []
     _check_times(options, runs)
@@ -140,7 +146,7 @@ def _film(plan: Plan, options: Namespace, form: str) -> Film:
         print(level_member.OUTDATED, file=sys.stderr)
     most = min(film.MOST_FRAMES, MOST_GIF_FRAMES // 2) if form == "gif" else film.MOST_FRAMES
     return film.film(
-        plan.experiment, record, runs, quantity, fps=_fps(options, form), frames=options.frames, start=options.start,
+        record, runs, quantity, fps=_fps(options, form), frames=options.frames, start=options.start,
         end=options.end, periods=options.window, most=most,
     )  # fmt: skip
 

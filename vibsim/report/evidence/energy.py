@@ -13,16 +13,15 @@ import numpy as np
 
 from vibsim.checks.fields import name_of
 from vibsim.core.array_types import Floats
-from vibsim.core.record import Record
 from vibsim.core.vocabulary import CENTRED, DRIFTS
 from vibsim.experiment.sweep_columns import options_of, recorded_columns
 from vibsim.observe.thresholds import LEAST_PERIODS, LEAST_SAMPLES, STILL
 from vibsim.report import style
-from vibsim.report.data import Member, at, time_label, times, unit, whole
+from vibsim.report.data import Member, Results
 from vibsim.report.evidence import frame
 from vibsim.report.evidence.frame import brief, evidence, measured, short
 from vibsim.report.style import Picture
-from vibsim.report.types import Axes, ConservesCheck, Experiment
+from vibsim.report.types import Axes, ConservesCheck
 
 WINDOWS = ((0.125, 0.25), (0.25, 0.5), (0.5, 1.0))  # of m3, m2 and m1, as fractions of the end
 NAMES = ("m₃", "m₂", "m₁")
@@ -54,9 +53,7 @@ class EnergyError:
         return not np.isfinite(self.means).all()
 
 
-def picture(
-    experiment: Experiment, record: Record, check: ConservesCheck, name: str, member: Member
-) -> Picture | None:
+def picture(record: Results, check: ConservesCheck, name: str, member: Member) -> Picture | None:
     """Draw the running maximum of the energy error beside the drift that a check expects."""
     series = f"{check.about}_running_max"
     if series not in record:
@@ -65,19 +62,19 @@ def picture(
         measured(record, name, field, member)
         for field in ("level", "drift", "drift_rate", "drift_power")
     )
-    initial = abs(float(at(record, "energy_initial", member)))
-    running = at(record, series, member, level=whole(record, "level").index(int(level))).copy()
-    options = options_of(experiment, recorded_columns(record), member.scheme, member.case)
-    scheme = experiment.schemes[member.scheme].method
-    if not scheme.has_own_end(experiment.model.definition, options):
+    initial = abs(float(record.at("energy_initial", member)))
+    running = record.at(series, member, level=record.levels.index(int(level))).copy()
+    experiment = record.experiment
+    options = options_of(experiment, recorded_columns(record), *member.place)
+    if not experiment.schemes[member.scheme].method.has_own_end(record.model, options):
         # the verdict leaves out a velocity with a formula of its own
         running[-1] = np.nan
     error = EnergyError(
         kind=DRIFTS[int(kind)],
         expected=check.drift,
-        t=times(record, member.case),
+        t=record.times(member.case),
         running=running / (initial or 1.0),
-        means=at(record, name_of(name, "window_means"), member) / (initial or 1.0),
+        means=record.at(name_of(name, "window_means"), member) / (initial or 1.0),
         round_off=measured(record, name, "round_off", member) / (initial or 1.0),
         power=power,
         rate=rate,
@@ -87,9 +84,9 @@ def picture(
         return evidence(f"{member.title}: {sentence}") if np.any(error.running == 0.0) else None
     by = " by [D₂ₜu]" if check.conserves.endswith(CENTRED) else ""
     label = f"largest energy error so far{' / E(0)' if initial else ''}{by}"
-    title = style.label(label, "" if initial else unit(record, "energy_deviation_max_abs"))
+    title = style.label(label, "" if initial else record.unit("energy_deviation_max_abs"))
     figure = style.canvas(1.0)
-    _draw(frame.panel(figure, title, time_label(record), frame.WIDE), error)
+    _draw(frame.panel(figure, title, record.time_label, frame.WIDE), error)
     caption = f"{member.title}, level {level:.0f}: {_naming(error)} {_dashed_line(error)}".strip()
     return evidence(caption, title, figure)
 

@@ -8,40 +8,39 @@ from typing import Any
 import numpy as np
 
 from vibsim.checks.fields import name_of
-from vibsim.core.record import Record
-from vibsim.report import data, style, words
-from vibsim.report.data import Member
+from vibsim.report import style
+from vibsim.report.data import Ladder, Member, Results
 from vibsim.report.evidence import frame
 from vibsim.report.evidence.frame import brief, evidence, measured, short
 from vibsim.report.style import Picture
 from vibsim.report.text.assertions import SOLUTIONS
-from vibsim.report.types import EqualCheck, Experiment
+from vibsim.report.types import EqualCheck
 
 DIPS = 10.0
 """Percentage of smallest differences, near zeros, that do not set the scale."""
 
 
-def picture(
-    _: Experiment, record: Record, check: EqualCheck, name: str, member: Member
-) -> Picture | None:
+def picture(record: Results, check: EqualCheck, name: str, member: Member) -> Picture | None:
     """Draw the size of the difference of two solutions over time, on a logarithmic scale."""
-    distance = data.at(record, name_of(name, "distance_over_time"), member)
+    distance = record.at(name_of(name, "distance_over_time"), member)
     bound, level, most = (
         measured(record, name, field, member) for field in ("allowed", "level", "distance")
     )
-    second = SOLUTIONS.get(check.second, check.second)
-    subject = f"{member.title}, level {level:.0f}: its {words.symbol(check.quantity)}"
+    ladder, second = (
+        Ladder(record, check.quantity, member),
+        SOLUTIONS.get(check.second, check.second),
+    )
+    subject = f"{member.title}, level {level:.0f}: its {ladder.letter}"
     if not np.isfinite(distance).any():
         return None
     usable = frame.usable(distance)
     if not usable.size:
         return evidence(f"{subject} and that of {second} are identical bit by bit at every time.")
-    unit = data.unit(record, f"{check.quantity}_finest")
-    title = style.label(f"difference of {words.symbol(check.quantity)}", unit)
+    title = style.label(f"difference of {ladder.letter}", ladder.unit())
     figure = style.canvas(1.0)
-    ax = frame.panel(figure, title, data.time_label(record), frame.WIDE)
+    ax = frame.panel(figure, title, record.time_label, frame.WIDE)
     ax.set_gid(style.TIME)
-    t = np.linspace(0.0, data.ends_of(record)[member.case], distance.size)
+    t = np.linspace(0.0, record.ends[member.case], distance.size)
     ax.set_xlim(t[0], t[-1])
     typical = usable[usable >= np.percentile(usable, DIPS)]
     frame.scale(ax, typical, np.array([bound, 0.1 * typical.max()]), is_log=True, margin=0.12)

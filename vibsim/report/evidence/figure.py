@@ -8,20 +8,19 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
 
 from vibsim.checks.fields import name_of
 from vibsim.core.array_types import Floats
-from vibsim.core.record import Record
 from vibsim.core.vocabulary import DECISIVE
-from vibsim.report import data, style, sweep_layout, words
-from vibsim.report.data import Member, is_lean, pick, unit
+from vibsim.report import style, sweep_layout, words
+from vibsim.report.choice import CheckedLadder
+from vibsim.report.data import Member, Results
 from vibsim.report.evidence import energy, equal, frame, order, stable, value
 from vibsim.report.evidence.frame import GrowthScale, evidence, usable
 from vibsim.report.style import Picture
-from vibsim.report.types import Check, ConservesCheck, EqualCheck, Experiment, StableCheck
+from vibsim.report.types import ConservesCheck, EqualCheck, StableCheck
 
 MANY = 60  # members up to which each has a dot; more are a line
 ALONE = (
@@ -34,32 +33,29 @@ BESIDE = {
 """Kind of a check to the field that is drawn beside the decisive one, and the words for it."""
 
 
-def picture(
-    experiment: Experiment, record: Record, asserted: Check | None, check: Mapping[str, Any]
-) -> Picture | None:
+def picture(checked: CheckedLadder) -> Picture | None:
     """Return the picture of the decisive result of a check; None if there is nothing to draw."""
+    record, asserted = checked.record, checked.asserted
     if asserted is None:
         return None
-    member = data.of_result(record, check["results"][0])
-    measured, name = asserted.measured, asserted.id
-    draw = DRAWN[measured.kind]
-    if is_lean(record) and draw in (energy.picture, equal.picture, stable.picture):
+    draw = DRAWN[checked.kind]
+    if record.is_lean and draw in (energy.picture, equal.picture, stable.picture):
         draw = _of_members
     with style.applied():
-        drawn = draw(experiment, record, measured, name, member)
-    return drawn and replace(drawn, name=f"evidence_{name}")
+        drawn = draw(record, asserted.measured, asserted.id, checked.member)
+    return drawn and replace(drawn, name=f"evidence_{asserted.id}")
 
 
 def _of_members(
-    _: Experiment, record: Record, check: StableCheck | ConservesCheck | EqualCheck, name: str, member: Member
-) -> Picture:  # fmt: skip
+    record: Results, check: StableCheck | ConservesCheck | EqualCheck, name: str, member: Member
+) -> Picture:
     """Draw the decisive number of all members against the swept value, or against the number of the member."""
-    count = len(record["case"])
+    count = record.count
     if count == 1:
         return evidence(f"{member.title}: {ALONE}")
 
     def numbers(field: str) -> Floats:
-        return np.asarray(pick(record, name_of(name, field), scheme=member.scheme), np.float64)
+        return np.asarray(record.pick(name_of(name, field), scheme=member.scheme), np.float64)
 
     other_field, remark = BESIDE.get(check.kind, ("", ""))
     values = numbers(DECISIVE[check.kind])
@@ -74,7 +70,7 @@ def _of_members(
     elif check.kind == "conserves":
         scale = GrowthScale("largest energy error / E(0)", is_log=True)
     else:
-        units = unit(record, f"{check.quantity}_difference_norm")
+        units = record.unit(f"{check.quantity}_difference_norm")
         text = f"largest difference of {words.symbol(check.quantity)}"
         scale = GrowthScale(style.label(text, units), is_log=True)
     keys = sweep_layout.keys(record)
@@ -110,4 +106,4 @@ DRAWN: Mapping[str, Callable[..., Picture | None]] = {
     "stable": stable.picture,
     "value": value.picture,
 }
-"""Kind of a check to its drawing, a function of experiment, record, check, id of the check, and member."""
+"""Kind of a check to its drawing, a function of the record, the check, the id of the check, and member."""

@@ -9,9 +9,8 @@ import numpy as np
 
 from vibsim.checks.fields import name_of
 from vibsim.core.array_types import Floats
-from vibsim.core.record import Record
 from vibsim.report import frame, style, words
-from vibsim.report.data import Member, at
+from vibsim.report.data import Member, Results
 from vibsim.report.style import Picture
 from vibsim.report.types import Axes, Figure
 
@@ -134,9 +133,9 @@ def usable(values: Floats) -> Floats:
     return style.finite(values[values > 0.0])
 
 
-def measured(record: Record, check: str, name: str, member: Member) -> float:
+def measured(record: Results, check: str, name: str, member: Member) -> float:
     """Return a number that a check measured for a member, such as ``growth``."""
-    return float(at(record, name_of(check, name), member))
+    return float(record.at(name_of(check, name), member))
 
 
 def short(value: float) -> str:

@@ -7,50 +7,45 @@ from typing import Any
 
 import numpy as np
 
-from vibsim.core.record import Record
-from vibsim.report import data, style, words
-from vibsim.report.data import Member, at
+from vibsim.report import style
+from vibsim.report.data import Ladder, Member, Results
 from vibsim.report.evidence import frame
 from vibsim.report.evidence.frame import evidence
 from vibsim.report.figures.order import draw_stated
 from vibsim.report.figures.time import differences as curves_of_differences
 from vibsim.report.style import Picture
-from vibsim.report.types import ConvergesCheck, Experiment, Figure
+from vibsim.report.types import ConvergesCheck, Figure
 
 
-def picture(
-    _: Experiment, record: Record, check: ConvergesCheck, name: str, member: Member
-) -> Picture | None:
+def picture(record: Results, check: ConvergesCheck, name: str, member: Member) -> Picture | None:
     """Draw the rescaled differences over time, if series are stored, and the order by level."""
-    quantity = check.converges
-    orders = f"{quantity}_observed_order"
-    if orders not in record or not np.isfinite(at(record, orders, member, check.norm)).any():
+    ladder = Ladder(record, check.converges, member)
+    if not ladder.has("observed_order", check.norm):
         return None
-    alt = f"Evidence on the order of {words.name(quantity)}"
+    alt = f"Evidence on the order of {ladder.name}"
     right_text = (
         "the order from three levels, at the coarsest of them; filled where it counts. Grey: what the check asks for. "
         "Bar, and in brackets above: the stated order with its 95 % interval, which often ends at a whole power."
     )
     figure = style.canvas(1.0)
-    has_series = f"{quantity}_rescaled" in record
+    has_series = "rescaled" in ladder
     if has_series:
-        _draw_differences(figure, record, quantity, member)
-    _draw_orders(figure, record, check, member)
+        _draw_differences(figure, ladder)
+    _draw_orders(figure, ladder, check)
     if not has_series:
         return evidence(f"{member.title}: {right_text}", alt, figure)
-    order = data.rescaling_order(record, member, quantity)
+    order = ladder.rescaling_order
     how = f"rescaled to coincide where the error has order {order:g}" if order else "as they are"
     left = f"Left: differences between levels of {member.title}, {how}; the finest pair is the thinnest line."
     return evidence(f"{left} Right: {right_text}", alt, figure)
 
 
-def _draw_differences(figure: Figure, record: Record, quantity: str, member: Member) -> None:
+def _draw_differences(figure: Figure, ladder: Ladder) -> None:
     """Draw the rescaled differences over time."""
-    t, curves = data.times(record, member.case), curves_of_differences(record, quantity, member)
+    t, curves = ladder.t, curves_of_differences(ladder)
     shown = [curve for curve in curves if curve.is_readable] or curves
-    measure = data.unit(record, f"{quantity}_rescaled")
-    title = style.label(f"rescaled differences of {words.symbol(quantity)}", measure)
-    ax = frame.panel(figure, title, data.time_label(record))
+    title = style.label(f"rescaled differences of {ladder.letter}", ladder.unit("rescaled"))
+    ax = frame.panel(figure, title, ladder.record.time_label)
     ax.set_gid(style.TIME)
     ax.set_xlim(float(t[0]), float(t[-1]))
     frame.scale(ax, *(curve.values for curve in shown), margin=0.05)
@@ -61,28 +56,25 @@ def _draw_differences(figure: Figure, record: Record, quantity: str, member: Mem
         ax.plot(*style.thin(t, curve.values, 120), label=curve.label, **look)
 
 
-def _draw_orders(figure: Figure, record: Record, check: ConvergesCheck, member: Member) -> None:
+def _draw_orders(figure: Figure, ladder: Ladder, check: ConvergesCheck) -> None:
     """Draw the order of every triple of levels, the expected order, and the stated one."""
-    quantity = check.converges
-    orders = at(record, f"{quantity}_observed_order", member, check.norm)
-    formal = data.formal_order(record, member, quantity)
-    expected = float(formal if check.order == "scheme" else check.order)
-    triples, levels = data.whole(record, "triple"), data.whole(record, "level")
-    first, last = data.window(record, quantity, member)
-    above = np.array(data.sound_triples(record, quantity, member))
+    orders = ladder.at("observed_order", check.norm)
+    expected = float(ladder.formal_order if check.order == "scheme" else check.order)
+    triples, levels = ladder.record.triples, ladder.record.levels
+    first, last = ladder.window
+    above = np.array(ladder.sound_triples)
     sound = orders[above & np.isfinite(orders)] if above.any() else orders
     around = expected + np.array([-0.5, 0.5])
-    ax = frame.panel(figure, f"order of {words.symbol(quantity)}", "level")
+    ax = frame.panel(figure, f"order of {ladder.letter}", "level")
     frame.level_axis(ax, levels)
     frame.scale(ax, np.clip(sound, -1.0, 9.0), around)
     if math.isfinite(expected):
         frame.allowed(ax, expected - check.tolerance, expected + check.tolerance)
         ax.axhline(expected, **frame.DASHED)
     # the data have the verdict on the scheme's order; an order of its own has another one
-    stated = math.isfinite(data.stated_order(record, quantity, member, check.norm)[0])
-    is_stated = stated or check.order != "scheme"
+    is_stated = check.order != "scheme" or math.isfinite(ladder.stated_order(check.norm)[0])
     counts = [
         is_stated and first <= triple and levels[i + 2] <= last for i, triple in enumerate(triples)
     ]
     frame.points(ax, triples, orders, counts)
-    draw_stated(ax, record, quantity, member, frame.COLOUR, check.norm)
+    draw_stated(ax, ladder, frame.COLOUR, check.norm)

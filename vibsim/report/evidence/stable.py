@@ -13,15 +13,13 @@ import numpy as np
 
 from vibsim.convergence.thresholds import BLOWN_UP, LIMIT_ROUNDING
 from vibsim.core.array_types import Floats
-from vibsim.core.record import Record
 from vibsim.core.vocabulary import HIGHEST
 from vibsim.report import style, words
-from vibsim.report.choice import position
-from vibsim.report.data import Member, at, optional, whole
+from vibsim.report.data import Member, Results
 from vibsim.report.evidence import frame
 from vibsim.report.evidence.frame import brief, evidence, measured, short, usable
 from vibsim.report.style import Picture
-from vibsim.report.types import Axes, Experiment, Figure, StableCheck
+from vibsim.report.types import Axes, Figure, StableCheck
 
 WIDTH = 1.56  # of a panel [inch]
 MOST_LEVELS = 8
@@ -52,17 +50,14 @@ class _Run:
         frame.points(ax, self.levels, values, [i == self.index for i in range(len(self.levels))])
 
 
-def picture(
-    experiment: Experiment, record: Record, _: StableCheck, name: str, member: Member
-) -> Picture | None:
+def picture(record: Results, _: StableCheck, name: str, member: Member) -> Picture | None:
     """Draw the numbers that decide whether a run is stable, by level."""
-    level = int(measured(record, name, "level", member))
-    levels = whole(record, "level")
-    p = at(record, HIGHEST if HIGHEST in record else "omega_dt", member)
-    limit = float(at(record, "stability_limit", member))
+    level, levels = int(measured(record, name, "level", member)), record.levels
+    p = record.at(HIGHEST if HIGHEST in record else "omega_dt", member)
+    limit = float(record.at("stability_limit", member))
     run = _Run(levels, levels.index(level), p, limit, style.canvas(1.0))
-    size = optional(record, "size_over_exact", ("level",), scheme=member.scheme, case=member.case)
-    letter = words.symbol(position(experiment))
+    size = record.optional("size_over_exact", ("level",), scheme=member.scheme, case=member.case)
+    letter = words.symbol(record.model.position)
     drawn = [_steps(run), _sizes(run, size, letter), _growths(run, record, member, name)]
     texts = [text for text in drawn if text]
     if not texts:
@@ -130,10 +125,10 @@ def _sizes(run: _Run, size: Floats, letter: str) -> str:
     return f"{text}, beyond {border}, and no finer level halves that."
 
 
-def _growths(run: _Run, record: Record, member: Member, name: str) -> str:
+def _growths(run: _Run, record: Results, member: Member, name: str) -> str:
     """Draw the measured and predicted growth factors per period; a prediction may be for small oscillations only."""
     observed, predicted = (
-        np.array(at(record, f"{origin}_growth", member)) for origin in ("measured", "theory")
+        np.array(record.at(f"{origin}_growth", member)) for origin in ("measured", "theory")
     )
     is_near = not math.isfinite(predicted[run.index])
     for values, field in ((observed, "growth"), (predicted, "predicted_growth")):

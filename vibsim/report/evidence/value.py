@@ -11,24 +11,21 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from vibsim.checks.fields import name_of
-from vibsim.checks.number_units import unit_of, unit_of_norm
+from vibsim.checks.number_units import unit_of_norm
 from vibsim.checks.value_text import what
 from vibsim.core.array_types import Floats
-from vibsim.core.record import Record
 from vibsim.core.vocabulary import OF_LEVEL
 from vibsim.experiment.value_names import OF_ONE_MEMBER
 from vibsim.observe.steady_state import continued
 from vibsim.report import style, words
-from vibsim.report.data import Member, at, norm_unit, pretty_unit, unit, whole
+from vibsim.report.data import Ladder, Member, Results, pretty_unit
 from vibsim.report.evidence import frame
 from vibsim.report.evidence.frame import evidence, measured
 from vibsim.report.style import Picture
-from vibsim.report.types import AccurateCheck, Axes, Experiment, ValueCheck
+from vibsim.report.types import AccurateCheck, Axes, ValueCheck
 
 
-def picture(
-    experiment: Experiment, record: Record, check: ValueCheck, name: str, member: Member
-) -> Picture | None:
+def picture(record: Results, check: ValueCheck, name: str, member: Member) -> Picture | None:
     """Draw a number by level, or its distance from the one that it should equal.
 
     None if no level has it, or all have the number expected.
@@ -36,7 +33,7 @@ def picture(
     if check.take not in OF_ONE_MEMBER:
         # the check is not on a number of a single member
         return None
-    by_level = _values(experiment, record, check, name, member)
+    by_level = _values(record, check, name, member)
     if by_level is None or not np.isfinite(by_level[0]).any():
         return None
     row = _row(record, check, name, member, by_level[0])
@@ -89,21 +86,20 @@ def _number_title(check: ValueCheck) -> str:
 
 
 def _values(
-    experiment: Experiment, record: Record, check: ValueCheck, name: str, member: Member
+    record: Results, check: ValueCheck, name: str, member: Member
 ) -> tuple[Floats, str] | None:
     """Return a number on every level with its unit; None if the record lacks it."""
     if (field := name_of(name, "value_by_level")) in record:
-        measure = pretty_unit(unit_of(experiment, record, check))
-        return at(record, field, member), measure
+        return record.at(field, member), record.unit_of_number(check)
     if check.at.t is not None or check.at.step is not None:
         return None
     variable = f"{check.quantity}_{check.value}" if check.quantity else check.value
     if variable in record and record.variable(variable).dims == OF_LEVEL:
-        return at(record, variable, member), unit(record, variable)
+        return record.at(variable, member), record.unit(variable)
     norm, errors = check.value.removeprefix("error_"), f"{check.quantity}_error_norm"
     if norm == check.value or errors not in record or norm not in record.words("norm"):
         return None
-    return at(record, errors, member, norm), norm_unit(record, str(check.quantity), norm)
+    return record.at(errors, member, norm), record.norm_unit(str(check.quantity), norm)
 
 
 @dataclass(frozen=True)
@@ -142,9 +138,9 @@ class ByLevel:
         return evidence(caption, ax.get_title(loc="left"), ax.get_figure(root=True))
 
 
-def _row(record: Record, check: ValueCheck, name: str, member: Member, values: Floats) -> ByLevel:
+def _row(record: Results, check: ValueCheck, name: str, member: Member, values: Floats) -> ByLevel:
     """Return the numbers of the levels, and after them the extrapolated one if the check judges that."""
-    levels = whole(record, "level")
+    levels = record.levels
     if check.at.level != "best":
         valid = check.number.own_levels(levels) or levels
         judged = valid[-1] if check.at.level is None else check.at.level
@@ -154,24 +150,19 @@ def _row(record: Record, check: ValueCheck, name: str, member: Member, values: F
     return ByLevel(levels, np.append(values, best), counts, member.title, bound)
 
 
-def of_error(
-    _: Experiment, record: Record, check: AccurateCheck, name: str, member: Member
-) -> Picture | None:
+def of_error(record: Results, check: AccurateCheck, name: str, member: Member) -> Picture | None:
     """Draw the errors of the levels; None if that of the finest level is unknown."""
     error, bound, size = (
         measured(record, name, field, member) for field in ("error", "error_bound", "size")
     )
-    levels = whole(record, "level")
+    levels, ladder = record.levels, Ladder(record, check.accurate, member)
     scale = size if check.is_relative else 1.0
-    errors = np.full(len(levels), np.nan)
-    norms = f"{check.accurate}_error_norm"
-    if norms in record:
-        errors = np.array(at(record, norms, member))
+    errors = np.array(ladder.optional("error_norm", ("level",)))
     errors[-1] = error
     if not (np.isfinite(bound) and error > 0.0 and scale > 0.0):
         return None
     shown, most = errors / scale, bound / scale
-    title = f"error of {words.symbol(check.accurate)}"
+    title = f"error of {ladder.letter}"
     measure = pretty_unit(unit_of_norm(record, check.accurate))
     title = f"relative {title}" if check.is_relative else style.label(title, measure)
     row = ByLevel(levels, shown, [level == levels[-1] for level in levels], member.title)
@@ -182,5 +173,5 @@ def of_error(
         f"{member.title}: the error in the L2 norm over time; filled at the finest level, with a bar up to its bound. "
         "Grey: what the check asks for."
     )
-    alt = f"Evidence on the error of {words.name(check.accurate)}"
+    alt = f"Evidence on the error of {ladder.name}"
     return evidence(caption, alt, ax.get_figure(root=True))

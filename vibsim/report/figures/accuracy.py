@@ -12,12 +12,11 @@ from typing import Any
 import numpy as np
 
 from vibsim.core.array_types import Floats
-from vibsim.core.record import Record
-from vibsim.report import data, style, words
-from vibsim.report.data import Member, omega_dt, optional
+from vibsim.report import style, words
+from vibsim.report.data import Ladder, Member, Results
 from vibsim.report.figures import panels
 from vibsim.report.style import Picture
-from vibsim.report.types import Axes, Experiment
+from vibsim.report.types import Axes
 
 POINTS = 240  # of a curve
 SMALL = 0.02  # w dt at which the leading term of a series is determined
@@ -25,21 +24,21 @@ EXACT = 1e-3  # largest relative difference between a coefficient and the fracti
 MOST_DENOMINATOR = 400
 
 
-def frequency(experiment: Experiment, record: Record) -> Picture | None:
+def frequency(record: Results) -> Picture | None:
     """Draw numerical over exact frequency of every scheme against w dt, with the first term of its series."""
     from vibsim import theory
 
-    w_dt = omega_dt(record)
+    w_dt = record.omega_dt
     usable = w_dt[np.isfinite(w_dt) & (w_dt > 0.0)]
     if not usable.size or "measured_phase_error" not in record:
         return None
-    limits = optional(record, "stability_limit", ("scheme", "case"))
+    limits = record.optional("stability_limit", ("scheme", "case"))
     grid = np.linspace(1e-3, float(usable.max()), POINTS)
-    measured = 1.0 / (1.0 - data.phase_error(record, "measured"))
+    measured = 1.0 / (1.0 - record.phase_error("measured"))
     (ax,) = panels.stacked([3.0])
     ax.axhline(1.0, **style.REFERENCE)
     drawn = [np.ones(1)]
-    for s, spec in enumerate(experiment.schemes):
+    for s, spec in enumerate(record.experiment.schemes):
         if spec.method.adaptive:
             continue
         look = style.look(s)
@@ -93,7 +92,7 @@ def _leading_term(start: Floats) -> tuple[int, str, float] | None:
     return order, f"1 {sign} {numerator}(w dt){words.superscript(order)}{denominator}", factor
 
 
-def second_difference(record: Record) -> Picture | None:
+def second_difference(record: Results) -> Picture | None:
     """Draw the second difference of a cosine over its second derivative against w dt."""
     fractions, p = _measured_fractions(record)
     if not p.size:
@@ -118,13 +117,13 @@ def second_difference(record: Record) -> Picture | None:
     )
 
 
-def _measured_fractions(record: Record) -> tuple[Floats, Floats]:
+def _measured_fractions(record: Results) -> tuple[Floats, Floats]:
     """Return E of the exact solution of every member on the coarsest mesh, and w dt there."""
     pairs = []
-    for case in range(len(record["case"])):
+    for case in range(record.count):
         member = Member(0, case, "")
-        u, w = data.exact_series(record, "u", member), data.natural_frequency(record, case)
-        t = data.times(record, case)
+        u, w = Ladder(record, "u", member).exact, record.natural_frequency(case)
+        t = record.times(case)
         if not np.isfinite(u).all() or t.size < 3 or not w > 0.0:
             continue
         dt = float(t[1] - t[0])

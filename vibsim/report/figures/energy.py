@@ -11,10 +11,12 @@ from typing import Any
 import numpy as np
 
 from vibsim.core.array_types import Floats
-from vibsim.core.record import Record
 from vibsim.core.vocabulary import MEMBER
 from vibsim.report import frame, style
-from vibsim.report.data import flags, largest, optional, pick, time_label, times, unit, whole
+from vibsim.report.data import (
+    Results,
+    largest,
+)
 from vibsim.report.figures.panels import stacked
 from vibsim.report.style import Picture
 from vibsim.report.types import Axes
@@ -25,28 +27,26 @@ DASHED = (0, (4, 1.6))
 WIDEST_RANGE = 1e18  # of the error axis: smaller errors, relative to the largest, are left out
 
 
-def running(record: Record, case: int) -> Picture | None:
+def running(record: Results, case: int) -> Picture | None:
     """Draw the running maxima of the energy error on the coarsest level.
 
     None if the record has none, or if every scheme's velocity is ``[D_2t u]``.
     """
     if not {OWN, CENTRED} <= set(record.variables):
         return None
-    t, level = times(record, case)[1:], whole(record, "level")[0]
+    t, level = record.times(case)[1:], record.levels[0]
     if not np.isfinite(np.asarray(record[CENTRED], dtype=np.float64)).any():
         return None
-    first = np.abs(optional(record, "energy_initial", MEMBER)[:, case])
+    first = np.abs(record.optional("energy_initial", MEMBER)[:, case])
     is_relative = bool(np.all(first > 0.0))
     # running maxima of the coarsest level, shape (scheme, t), without the first time
     scale = first[:, None] if is_relative else 1.0
-    maxima = (
-        np.asarray(pick(record, name, case=case, level=0), np.float64) for name in (OWN, CENTRED)
-    )
-    both = [style.no_zeros(part[:, 1:] / scale) for part in maxima]
+    maxima = (record.pick(name, case=case, level=0) for name in (OWN, CENTRED))
+    both = [style.no_zeros(part[:, 1:].astype(np.float64) / scale) for part in maxima]
     # without an initial energy only the errors themselves give a size
     sizes = [size for part in both for row in part if (size := largest(row))]
     most = frame.UNBOUNDED * (1.0 if is_relative else min(sizes, default=1.0))
-    names = record.words("scheme")
+    names = record.schemes
     groups = [range(i, min(i + MOST, len(names))) for i in range(0, len(names), MOST)]
     axes = stacked([2.5] * len(groups), style.TIME)
     leaves = False
@@ -66,10 +66,10 @@ def running(record: Record, case: int) -> Picture | None:
         ax.plot([], [], color=style.GREY, label="own velocity")
         ax.plot([], [], color=style.GREY, linestyle=DASHED, label="[D₂ₜu]")
         style.beside(ax, fontsize=8, handlelength=2.4)
-        text = style.label("max |ΔE| so far", unit(record, "energy_deviation_max_abs"))
+        text = style.label("max |ΔE| so far", record.unit("energy_deviation_max_abs"))
         ax.set_ylabel("max |ΔE| / E(0) so far" if is_relative else text)
     axes[0].set_title("Energy error by velocity")
-    axes[-1].set_xlabel(time_label(record))
+    axes[-1].set_xlabel(record.time_label)
     return Picture(
         name=f"energy_running_{case}",
         title=f"How does the energy error grow with time? Level {level}",
@@ -81,13 +81,13 @@ def running(record: Record, case: int) -> Picture | None:
     )
 
 
-def _drift(record: Record, s: int, case: int) -> str:
+def _drift(record: Results, s: int, case: int) -> str:
     """Return the kind of drift for the legend; empty if the analysis named none. A run may also have broken down."""
     if record["status"][s, case, 0] != 0:
         return f": {frame.BROKE_DOWN}"
     if "energy_drift_kind" not in record:
         return ""
-    kind = str(flags(record, "energy_drift_kind")[s, case, 0]).replace("_", " ")
+    kind = str(record.flags("energy_drift_kind")[s, case, 0]).replace("_", " ")
     return f": {kind}" if kind not in {"", "unknown", "not applicable"} else ""
 
 

@@ -12,13 +12,11 @@ from typing import Any
 import numpy as np
 
 from vibsim.core.array_types import Floats
-from vibsim.core.record import Record
-from vibsim.report import choice, data, frame, style
-from vibsim.report.choice import position
-from vibsim.report.data import Member, at, whole
+from vibsim.report import choice, frame, style
+from vibsim.report.data import Ladder, Member, Results
 from vibsim.report.figures.panels import move_label_left, note, stacked
 from vibsim.report.style import Picture
-from vibsim.report.types import Axes, Experiment
+from vibsim.report.types import Axes
 
 FEWEST_PEAKS = 3  # that show how a period changes
 MOST_CURVES = 6  # more would lie on one another
@@ -33,27 +31,22 @@ Run = tuple[str, Member, int]
 """A curve: label, scheme and member, position of the level."""
 
 
-def local(
-    experiment: Experiment, record: Record, shown: list[Member], peaks: int = 2
-) -> Picture | None:
+def local(record: Results, shown: list[Member], peaks: int = 2) -> Picture | None:
     """Draw local periods, amplitudes and the phase error of one member; None with fewer than `peaks` peaks."""
     runs = runs_of(record, shown, peaks)
     if not runs:
         return None
     axes, case = stacked([2.1, 2.1, 2.1]), shown[0].case
-    exact = float(data.exact_periods(record)[case])
-    start = first_peak(experiment, record, case, exact)
-    looks = looks_of(runs)
-    by_run = [
-        _draw(axes, record, run, look, exact, start) for run, look in zip(runs, looks, strict=True)
-    ]
+    exact, size = float(record.exact_periods[case]), exact_amplitude(record, case)
+    start = first_peak(record, case, exact)
+    pairs = zip(runs, looks_of(runs), strict=True)
+    by_run = [_draw(axes, record, run, look, exact, start) for run, look in pairs]
     drawn = list(zip(*by_run, strict=True))
-    size = exact_amplitude(experiment, record, case)
     for ax, value in zip(axes, (exact, size, 0.0), strict=True):
         if math.isfinite(value):
             ax.axhline(value, label="exact" if ax is axes[0] else "", **style.REFERENCE)
     leaves = _ranges(axes, drawn, (exact, size, math.nan))
-    time, measure = data.time_unit(record), data.unit(record, f"{position(experiment)}_finest")
+    time, measure = record.time_unit, record.unit(f"{record.model.position}_finest")
     rows = (
         ("Local period", "local period", time),
         ("Local amplitude", "local amplitude", measure),
@@ -77,7 +70,7 @@ def local(
     )
 
 
-def runs_of(record: Record, members: list[Member], peaks: int = 2) -> list[Run]:
+def runs_of(record: Results, members: list[Member], peaks: int = 2) -> list[Run]:
     """Choose the curves of the first member that have at least `peaks` peaks.
 
     One or two schemes are drawn on several levels, more schemes on the coarsest level.
@@ -85,12 +78,12 @@ def runs_of(record: Record, members: list[Member], peaks: int = 2) -> list[Run]:
     if "peak_time" not in record:
         return []
     members = [member for member in members if member.case == members[0].case]
-    levels = whole(record, "level")
+    levels = record.levels
     count = max(1, min(len(levels), 4, MOST_CURVES // max(1, len(members))))
     runs = []
     for member in members[:MOST_CURVES]:
         for i in range(count):
-            if np.isfinite(at(record, "peak_time", member, level=i)).sum() >= peaks:
+            if np.isfinite(record.at("peak_time", member, level=i)).sum() >= peaks:
                 scheme = member.scheme_name if len(members) > 1 else ""
                 label = ", ".join(filter(None, [scheme, f"level {levels[i]}" if count > 1 else ""]))
                 runs.append((label or f"level {levels[i]}", member, i))
@@ -111,7 +104,7 @@ def looks_of(runs: list[Run]) -> list[dict[str, Any]]:
 
 
 def _draw(
-    axes: list[Axes], record: Record, run: Run, look: dict[str, Any], exact: float, start: float
+    axes: list[Axes], record: Results, run: Run, look: dict[str, Any], exact: float, start: float
 ) -> list[Any]:
     """Draw a run in the three panels and return its lines."""
     label, member, level = run
@@ -153,10 +146,10 @@ def _heights_of(line: Any) -> Floats:
     return np.asarray(line.get_ydata(), dtype=np.float64)
 
 
-def _peaks(record: Record, member: Member, level: int) -> tuple[Floats, Floats, Floats]:
+def _peaks(record: Results, member: Member, level: int) -> tuple[Floats, Floats, Floats]:
     """Return the interpolated times of the peaks, their grid points in time, and the amplitudes."""
     names = ("peak_time", "peak_time_grid", "peak", "trough_time", "trough")
-    time, grid, peak, *troughs = (at(record, name, member, level=level) for name in names)
+    time, grid, peak, *troughs = (record.at(name, member, level=level) for name in names)
     keep = np.isfinite(time)
     return time[keep], grid[keep], heights(time[keep], peak[keep], *troughs)
 
@@ -170,39 +163,37 @@ def heights(time: Floats, peak: Floats, trough_time: Floats, trough: Floats) -> 
     return np.asarray(0.5 * (peak - trough[is_known][after]))
 
 
-def first_peak(experiment: Experiment, record: Record, case: int, period: float) -> float:
+def first_peak(record: Results, case: int, period: float) -> float:
     """Return the time of the first exact peak after the start; NaN if no formula gives it.
 
     It is known for linear models, and for any motion that starts at rest, as one period or half of one.
     """
-    u, v = _start(experiment, record, case)
+    u, v = _start(record, case)
     if not math.isfinite(period) or u == v == 0.0:
         return math.nan
     if v == 0.0:
         return period if u > 0.0 else period / 2.0
-    if not experiment.model.definition.linear:
+    if not record.model.linear:
         return math.nan
     angle = math.atan2(v * period / math.tau, u) % math.tau
     return angle / math.tau * period
 
 
-def _start(experiment: Experiment, record: Record, case: int) -> tuple[float, float]:
+def _start(record: Results, case: int) -> tuple[float, float]:
     """Return the initial position and velocity of a member."""
-    model, member = experiment.model.definition, Member(0, case, "")
-    names = (model.position, model.velocity)
-    u, v = (float(at(record, f"{name}_finest", member)[0]) for name in names)
-    return u, v
+    position = Ladder(record, record.model.position, Member(0, case, ""))
+    return float(position.finest[0]), float(position.of(record.model.velocity).finest[0])
 
 
-def exact_amplitude(experiment: Experiment, record: Record, case: int) -> float:
+def exact_amplitude(record: Results, case: int) -> float:
     """Return the exact amplitude, known for conservative models that are linear or start at rest; else NaN."""
-    if not experiment.model.definition.conservative:
+    if not record.model.conservative:
         return math.nan
-    u, v = _start(experiment, record, case)
+    u, v = _start(record, case)
     if v == 0.0:
         return abs(u)
-    linear = experiment.model.definition.linear
-    return math.hypot(u, v / data.natural_frequency(record, case)) if linear else math.nan
+    linear = record.model.linear
+    return math.hypot(u, v / record.natural_frequency(case)) if linear else math.nan
 
 
 def _ranges(
@@ -243,27 +234,28 @@ def _draw_logarithmic(ax: Axes, lines: tuple[Any, ...], size: float) -> None:
     note(ax, "size, logarithmic")
 
 
-def frequency(experiment: Experiment, record: Record) -> Picture | None:
+def frequency(record: Results) -> Picture | None:
     """Draw local angular frequency and amplitude against the number of the peak; None with fewer than two peaks."""
-    everyone = choice.with_levels(experiment, data.all_members(record))
+    everyone = choice.with_levels(record, record.all_members)
     runs = runs_of(record, everyone)
     if not runs:
         return None
     axes, case = stacked([2.3, 2.3]), everyone[0].case
     several = len({member.scheme for _, member, _ in runs}) > 1
-    step, period = data.steps_of(record, case), float(data.exact_periods(record)[case])
+    step, period = record.dt(case), float(record.exact_periods[case])
     for (_, member, level), look in zip(runs, looks_of(runs), strict=True):
         t, _, amplitude = _peaks(record, member, level)
-        dt = f"dt = {data.time_text(record, step[level])}"
+        dt = f"dt = {record.time_text(step[level])}"
         text = style.entry(f"{member.scheme_name}, {dt}" if several else dt)
         line = look | {"linewidth": 1.1, "markersize": 4, "label": text}
         line["marker"] = look["marker"] if t.size <= MARKED else ""
         for ax, values in zip(axes, (2.0 * np.pi / np.diff(t), amplitude), strict=True):
             ax.plot(np.arange(1, values.size + 1), values, **line)
-    size = exact_amplitude(experiment, record, case)
-    measure = data.unit(record, f"{position(experiment)}_finest")
-    frequency_row = "angular frequency", data.radians_unit(record), 2.0 * math.pi / period
-    rows = frequency_row, ("amplitude", measure, size)
+    measure = record.unit(f"{record.model.position}_finest")
+    rows = (
+        ("angular frequency", record.radians_unit, 2.0 * math.pi / period),
+        ("amplitude", measure, exact_amplitude(record, case)),
+    )
     for ax, (text, unit, value) in zip(axes, rows, strict=True):
         if math.isfinite(value):
             ax.axhline(value, label="exact", **style.REFERENCE)

@@ -12,22 +12,20 @@ from typing import Any
 import numpy as np
 
 from vibsim.checks.fields import field_values
-from vibsim.checks.number_units import unit_of
 from vibsim.checks.order_context import COINCIDE
 from vibsim.checks.outcome import about_members
 from vibsim.core.array_types import Flags, Floats
-from vibsim.core.record import Record
 from vibsim.core.vocabulary import SECONDS_OF_NORM
-from vibsim.report import choice, data, finest_level, series, style, sweep_layout, words
-from vibsim.report.choice import Lead
-from vibsim.report.data import Member
+from vibsim.report import choice, finest_level, series, style, sweep_layout, words
+from vibsim.report.choice import CheckedLadder
+from vibsim.report.data import Ladder, Member
 from vibsim.report.figures import moments, panels, time
 from vibsim.report.figures.solution import DOTS
 from vibsim.report.figures.sweeps.view import key_axis, of_a_member, ring
 from vibsim.report.style import Picture
 from vibsim.report.sweep_layout import Along, Grid
 from vibsim.report.text import findings
-from vibsim.report.types import Axes, Experiment
+from vibsim.report.types import Axes
 
 LEFT, RIGHT, HEIGHT = 5.4, 3.9, 2.75
 """Widths of the left and the right picture, and their height [inch]."""
@@ -73,19 +71,19 @@ def _legend(ax: Axes, columns: int, size: float) -> None:
     )  # fmt: skip
 
 
-def differences(record: Record, lead: Lead) -> Picture | None:
+def differences(lead: CheckedLadder) -> Picture | None:
     """Draw the rescaled differences of the levels; None without stored series or with a single level."""
-    quantity, member = lead.quantity, lead.member
-    if f"{quantity}_difference" not in record:
+    if "difference" not in lead:
         return None
-    t, curves = data.times(record, member.case), time.differences(record, quantity, member)
+    t, curves = lead.t, time.differences(lead)
     shown = [curve for curve in curves if curve.is_readable] or curves
     values = [curve.values for curve in shown]
     if not np.any(style.finite(*values)):
         return None
     scale = panels.Scale.of(values)
-    letter, measure = words.symbol(quantity), data.unit(record, f"{quantity}_difference")
-    ax = _panel(LEFT, style.label(f"rescaled differences of {letter}", measure, scale.exponent))
+    letter = lead.letter
+    text = style.label(f"rescaled differences of {letter}", lead.unit("difference"), scale.exponent)
+    ax = _panel(LEFT, text)
     ax.set_gid(style.TIME)
     # a name of several words would take the room of the curves
     labels = [
@@ -97,23 +95,22 @@ def differences(record: Record, lead: Lead) -> Picture | None:
         ax.plot(*line, label=labels[i], gid=curve.group, color=colour, linewidth=width)
     scale.apply(ax)
     ax.set_xlim(float(t[0]), float(t[-1]) if t[-1] > t[0] else 1.0)
-    ax.set_xlabel(data.time_label(record))
-    size = 8.0 if max(map(len, labels)) < LONG else 6.0
-    _legend(ax, columns=3, size=size)
+    ax.set_xlabel(lead.record.time_label)
+    _legend(ax, columns=3, size=8.0 if max(map(len, labels)) < LONG else 6.0)
     return Picture(
         "hero_differences",
-        _title_of_differences(record, lead, len(shown)),
+        _title_of_differences(lead, len(shown)),
         "The difference between each level and the next finer one, multiplied so that the curves fall on one another "
         "where the error has the promised order.",
-        f"Rescaled differences of {words.name(quantity)} between successive levels against time, {member.title}",
+        f"Rescaled differences of {lead.name} between successive levels against time, {lead.title}",
         ax.get_figure(root=True),
     )
 
 
-def _title_of_differences(record: Record, lead: Lead, count: int) -> str:
+def _title_of_differences(lead: CheckedLadder, count: int) -> str:
     """Say whether the curves coincide, and how well."""
-    last = data.coincidence(record, lead.quantity, lead.member)
-    several = lead.member.scheme_name if len(record["scheme"]) > 1 else ""
+    last = lead.coincidence
+    several = lead.member.scheme_name if len(lead.record.schemes) > 1 else ""
     case = lead.member.case_words
     # a long name would take several lines, and stands among the large numbers
     member = case if len(case) < LONG else "hardest member"
@@ -128,26 +125,25 @@ def _title_of_differences(record: Record, lead: Lead, count: int) -> str:
     return f"The finest curves agree to {words.number(100.0 * last, 'brief')} %{of}"
 
 
-def against_step(record: Record, lead: Lead) -> Picture | None:
+def against_step(lead: CheckedLadder) -> Picture | None:
     """Draw the errors of all schemes and levels against the step; None if there are too few."""
-    quantity, case = lead.quantity, lead.member.case
-    letter, measure = words.symbol(quantity), data.norm_unit(record, quantity, "linf")
-    names = record.words("scheme")
-    others = [s for s in range(len(names)) if s != lead.member.scheme][: MOST_SCHEMES - 1]
+    record, dt, first = lead.record, lead.dt, lead.scheme
+    others = [s for s in range(len(record.schemes)) if s != first][: MOST_SCHEMES - 1]
     # an L2 norm over the root of the duration is the root of the mean square
-    dt = data.steps_of(record, case)
-    scale = float(data.ends_of(record)[case]) ** SECONDS_OF_NORM[lead.norm]
-    ax = _panel(RIGHT, style.label(f"{SIZES[lead.norm]} of {letter}", measure))
+    scale = float(record.ends[lead.case]) ** SECONDS_OF_NORM[lead.norm]
+    ax = _panel(RIGHT, style.label(f"{SIZES[lead.norm]} of {lead.letter}", lead.norm_unit("linf")))
     ax.set_gid(style.STEP)
     drawn: list[Floats] = []
     notes, slopes = dict[str, None](), set[float]()
-    for s in [*others, lead.member.scheme]:
-        member = Member(s, case, names[s])
-        if not math.isfinite(data.formal_order(record, member, quantity)):
+    for s in [*others, first]:
+        name = record.schemes[s]
+        ladder = lead.with_member(Member(s, lead.case, name))
+        order = ladder.formal_order
+        if not math.isfinite(order):
             continue
-        estimate, true = (one / scale for one in _errors(record, quantity, member, lead.norm))
-        is_lead, alone = s == lead.member.scheme, not others
-        text = "estimated" if alone else style.entry(names[s])
+        estimate, true = (one / scale for one in _errors(ladder, lead.norm))
+        is_lead, alone = s == first, not others
+        text = "estimated" if alone else style.entry(name)
         mark: dict[str, Any] = {"linestyle": "none", "gid": None if alone else text}
         mark |= {"color": style.COLOURS[s % style.MANY], "marker": style.MARKERS[s % style.MANY]}
         is_estimated = style.finite(estimate).size > 0
@@ -158,24 +154,23 @@ def against_step(record: Record, lead: Lead) -> Picture | None:
         if style.finite(true).size:
             ring = mark | {"markerfacecolor": "none", "markersize": 9 if is_lead else 6.5}
             # one entry for each scheme: that of its estimate, if it has one
-            of_scheme = f"_true, {names[s]}" if is_estimated else text
+            of_scheme = f"_true, {name}" if is_estimated else text
             ax.plot(dt, true, **ring, label="true" if alone else of_scheme)
             drawn.append(true)
             notes["Rings: the true error."] = None
-        has_order = math.isfinite(data.stated_order(record, quantity, member, lead.norm)[0])
+        has_order = math.isfinite(ladder.stated_order(lead.norm)[0])
         is_lead_on_order = is_lead and lead.is_on_order and lead.result.get("reason") != "exact"
-        order = data.formal_order(record, member, quantity)
         if (has_order or is_lead_on_order) and order not in slopes:
             slopes.add(order)
             error = np.where(np.isfinite(true), true, estimate)
-            _slope(ax, dt, error, order, data.basis_of_order(record, quantity))
+            _slope(ax, dt, error, order, lead.basis_of_order)
     if sum(style.finite(part).size for part in drawn) < FEWEST_ERRORS:
         return None
     high = max(float(part[np.isfinite(part)].max()) for part in drawn)
     style.fit_log_axis(ax, "y", *drawn, least=1e-18, room=2.5, most=5)
     style.log_axis(ax, "x", float(dt.min()) / 1.4, float(dt.max()) * 1.4, most=4)
     ax.set_ylim(top=min(2.5 * high, style.LARGEST))
-    ax.set_xlabel(style.label("time step dt", data.time_unit(record, "dt")))
+    ax.set_xlabel(style.label("time step dt", record.time_unit))
     _legend(ax, columns=2, size=7.5)
     title, found = "Error against time step", findings.factor(lead)
     if found is not None:
@@ -190,61 +185,55 @@ def against_step(record: Record, lead: Lead) -> Picture | None:
         style.sentences(
             "Both axes are logarithmic, so an error of order p is a line of slope p.", *notes
         ),
-        f"Error of {words.name(quantity)} against the time step",
+        f"Error of {lead.name} against the time step",
         ax.get_figure(root=True),
     )
 
 
-def solution(
-    experiment: Experiment, record: Record, quantity: str, member: Member, *, is_left: bool
-) -> Picture:
+def solution(ladder: Ladder, *, is_left: bool) -> Picture:
     """Draw a quantity at the finest level, and the exact solution."""
-    t, values = data.times(record, member.case), data.at(record, f"{quantity}_finest", member)
-    letter, exact = words.symbol(quantity), series.exact_curve(experiment, record, quantity, member)
-    ax = _panel(
-        LEFT if is_left else RIGHT, style.label(letter, data.unit(record, f"{quantity}_finest"))
-    )
+    t, values, steps = ladder.t, ladder.finest, ladder.record.steps[-1]
+    exact, name = series.exact_curve(ladder), ladder.record.name_of_exact
+    ax = _panel(LEFT if is_left else RIGHT, style.label(ladder.letter, ladder.unit()))
     ax.set_gid(style.TIME)
-    has_exact, name = bool(np.isfinite(exact[1]).any()), series.name_of_exact(experiment)
+    has_exact = bool(np.isfinite(exact[1]).any())
     first = moments.first_shown(t, values)
-    start, title = float(t[first]), f"{letter}(t), {member.title}"
+    start, title = float(t[first]), f"{ladder.letter}(t), {ladder.title}"
     # as in the figure of the motion, lines between too few samples would cut off its extremes
-    turns = exact if has_exact else (t, values)
-    is_dotted = moments.is_undersampled(int(record["steps"][-1]), t, turns)
+    is_dotted = moments.is_undersampled(steps, t, exact if has_exact else (t, values))
     if first:
         title += f", last {moments.WINDOW_PERIODS:g} periods"
-        exact = series.exact_curve(experiment, record, quantity, member, start=start)
+        exact = series.exact_curve(ladder, start=start)
         t, values = t[first:], values[first:]
     if has_exact:
         ax.plot(*style.thin(*exact, 200), color=style.PALE, linewidth=4.5, label=name)
-    text = f"{words.number(int(record['steps'][-1]), 'integer')} steps"
+    text = f"{words.number(steps, 'integer')} steps"
     look: dict[str, Any] = DOTS if is_dotted else {"linewidth": 1.4}
     ax.plot(*style.thin(t, values, 200), color=style.COLOURS[0], label=text, **look)
     panels.fit_values(ax, [values], exact[1])
     panels.stop_at_breakdown(ax, t, [values])
-    ax.set_xlabel(data.time_label(record))
+    ax.set_xlabel(ladder.record.time_label)
     _legend(ax, columns=2, size=8.0)
     return Picture(
         "hero_solution", title,
         "The solution of the finest level." + f" Wide and grey: the {name} solution." * has_exact,
-        f"{words.name(quantity)} against time for {member.title}", ax.get_figure(root=True),
+        f"{ladder.name} against time for {ladder.title}", ax.get_figure(root=True),
     )  # fmt: skip
 
 
-def _errors(record: Record, quantity: str, member: Member, norm: str) -> tuple[Floats, Floats]:
+def _errors(ladder: Ladder, norm: str) -> tuple[Floats, Floats]:
     """Return the estimated and the true error of every level in a norm, shape (level,); NaN if unknown.
 
     With the difference d of two levels and the ratio r of their errors, the error of the coarser one is d r/(r - 1), of
     the finer one d/(r - 1).
     """
-    levels, place = data.whole(record, "level"), {"scheme": member.scheme, "case": member.case}
-    true = data.optional(record, f"{quantity}_error_norm", ("level",), norm, **place)
+    levels, true = ladder.record.levels, ladder.optional("error_norm", ("level",), norm)
     estimate = np.full(len(levels), np.nan)
-    if data.whole(record, "pair"):
-        gap = data.at(record, f"{quantity}_difference_norm", member, norm)
+    if ladder.record.pairs:
+        gap = ladder.at("difference_norm", norm)
         # stated or estimated: both give the estimate that the tables have
-        order = float(data.at(record, f"{quantity}_order", member, norm))
-        order = order if math.isfinite(order) else data.formal_order(record, member, quantity)
+        order = float(ladder.at("order", norm))
+        order = order if math.isfinite(order) else ladder.formal_order
         if math.isfinite(order) and order > 0.0:
             rest = 2.0 ** (order * np.diff(levels)) - 1.0
             estimate = np.append(gap * (rest + 1.0) / rest, gap[-1] / rest[-1])
@@ -262,28 +251,29 @@ def _slope(ax: Axes, dt: Floats, error: Floats, order: float, due: str) -> None:
             ax.plot(dt, line, **look, label=f"order {order:g}, {due}")
 
 
-def response(experiment: Experiment, record: Record, lead: Lead) -> Picture | None:
+def response(lead: CheckedLadder) -> Picture | None:
     """Draw a number of every member over the swept parameters, with the decisive one marked; None without a sweep."""
+    record = lead.record
     keys = sweep_layout.keys(record)
-    found = _number(experiment, record, lead) if keys else None
+    found = _number(lead) if keys else None
     if found is None:
         return None
     name, text, values = found
-    layout = sweep_layout.layout_of(experiment, record)
+    layout = sweep_layout.layout_of(record)
     hollow = np.zeros(values.shape, np.bool_)
     if isinstance(layout, Along):
         if name == "amplitude":
-            hollow = finest_level.unsettled(record, choice.position(experiment))[lead.member.scheme]
+            hollow = finest_level.unsettled(record)[lead.scheme]
         ax = _curves(lead, layout, values, text, hollow)
     elif isinstance(layout, Grid):
         ax = _map(lead, layout, values, text)
     else:
         ax = _dots(lead, max(keys, key=lambda key: key.distinct.size), values, text)
-    known, every = int(np.isfinite(values).sum()), len(record["case"])
+    known, every = int(np.isfinite(values).sum()), record.count
     count = words.number(every, "integer")
     if known < every:
         count = f"{words.number(known, 'integer')} of {count}"
-    is_marked = math.isfinite(values[lead.member.case])
+    is_marked = math.isfinite(values[lead.case])
     return Picture(
         "hero_response",
         f"{words.PAGE.opening(name)} in {count} members",
@@ -296,33 +286,31 @@ def response(experiment: Experiment, record: Record, lead: Lead) -> Picture | No
     )
 
 
-def _number(experiment: Experiment, record: Record, lead: Lead) -> tuple[str, str, Floats] | None:
+def _number(lead: CheckedLadder) -> tuple[str, str, Floats] | None:
     """Return name, label and values, shape (case,), of the first number that differs between members.
 
     The number that decides comes first, then period and amplitude, those of checks first, then the error of the finest
     level.
     """
-    position, scheme, check = choice.position(experiment), lead.member.scheme, lead.measured
+    record = lead.record
+    scheme, check = lead.scheme, lead.measured
     if lead.entry is not None and check is not None and check.kind == "value":
         values = field_values(record, lead.entry["id"], "value")[scheme]
         if finest_level.varies(values):
-            name, alone = of_a_member(check, experiment.levels[-1])
-            unit = data.pretty_unit(unit_of(experiment, record, alone))
-            return name, style.label(name, unit), values
-    checked = [check.value for check in choice.asked_values(experiment)]
+            name, alone = of_a_member(check, record.experiment.levels[-1])
+            return name, style.label(name, record.unit_of_number(alone)), values
+    checked = [check.value for check in choice.asked_values(record)]
     usual = ["period", "amplitude"]
-    usual = usual if experiment.model.definition.conservative else usual[::-1]
+    usual = usual if record.model.conservative else usual[::-1]
     for name in [*(name for name in checked if name in usual), *usual]:
         if name in record:
-            values = finest_level.measured(record, name, position).value[scheme]
+            values = finest_level.measured(record, name).value[scheme]
             if finest_level.varies(values):
-                return name, style.label(name, data.unit(record, name)), values
-    quantity = lead.quantity
-    error = finest_level.error(record, quantity).best[scheme]
+                return name, style.label(name, record.unit(name)), values
+    error, text = finest_level.error(record, lead.quantity).best[scheme], f"error of {lead.letter}"
     if not finest_level.varies(error):
         return None
-    text = f"error of {words.symbol(quantity)}"
-    return text, style.label(text, data.norm_unit(record, quantity)), error
+    return text, style.label(text, lead.norm_unit()), error
 
 
 def _scaled(ax: Axes, values: Floats) -> None:
@@ -340,7 +328,7 @@ def _across(ax: Axes, key: sweep_layout.Key) -> None:
     key_axis(ax, key, 0.02, most=5)
 
 
-def _curves(lead: Lead, along: Along, values: Floats, text: str, hollow: Flags) -> Axes:
+def _curves(lead: CheckedLadder, along: Along, values: Floats, text: str, hollow: Flags) -> Axes:
     """Draw curves over the key, with `hollow` markers for some members; few values are not joined."""
     ax = _panel(LEFT, text)
     for i, (name, cases) in enumerate(along.lines):
@@ -361,7 +349,7 @@ def _curves(lead: Lead, along: Along, values: Floats, text: str, hollow: Flags) 
     return ax
 
 
-def _map(lead: Lead, grid: Grid, values: Floats, text: str) -> Axes:
+def _map(lead: CheckedLadder, grid: Grid, values: Floats, text: str) -> Axes:
     from matplotlib.colors import LogNorm, Normalize
 
     ax = _panel(LEFT, text, right=0.95)
@@ -387,7 +375,7 @@ def _map(lead: Lead, grid: Grid, values: Floats, text: str) -> Axes:
     return ax
 
 
-def _dots(lead: Lead, key: sweep_layout.Key, values: Floats, text: str) -> Axes:
+def _dots(lead: CheckedLadder, key: sweep_layout.Key, values: Floats, text: str) -> Axes:
     ax, is_many = _panel(LEFT, text), values.size > 500
     ax.plot(key.values, values, ".", color=style.COLOURS[0], markersize=3, rasterized=is_many)
     _across(ax, key)
@@ -396,31 +384,32 @@ def _dots(lead: Lead, key: sweep_layout.Key, values: Floats, text: str) -> Axes:
     return ax
 
 
-def _mark(ax: Axes, x: Floats, y: Floats, lead: Lead, *, on_map: bool = False) -> None:
+def _mark(ax: Axes, x: Floats, y: Floats, lead: CheckedLadder, *, on_map: bool = False) -> None:
     """Draw a ring around the decisive member, and explain it above the axes, where it hides no curve."""
-    case = lead.member.case
+    case = lead.case
     if ring(ax, float(x[case]), float(y[case]), on_map=on_map):
         _name(ax, f"{ax.get_title(loc='left')} · ring: hardest member")
 
 
-def orders(experiment: Experiment, record: Record, lead: Lead) -> Picture | None:
+def orders(lead: CheckedLadder) -> Picture | None:
     """Draw the stated orders of all members: dots over the key with most values, or a histogram of many."""
-    keys, quantity, scheme = sweep_layout.keys(record), lead.quantity, lead.member.scheme
-    if not keys or not data.whole(record, "triple"):
+    record = lead.record
+    keys, quantity, scheme = sweep_layout.keys(record), lead.quantity, lead.scheme
+    if not keys or not record.triples:
         return None
-    order, low, high = (part[scheme] for part in data.stated_orders(record, quantity, lead.norm))
+    order, low, high = (part[scheme] for part in record.stated_orders(quantity, lead.norm))
     known = np.isfinite(order)
     if not known.any():
         return None
-    promised = data.formal_orders(record, quantity)[scheme]
-    allowed = choice.tolerance(experiment, quantity, record.words("scheme")[scheme])
+    promised = record.formal_orders(quantity)[scheme]
+    allowed = choice.tolerance(record, quantity, record.schemes[scheme])
     checked = about_members(record, lead.measured if lead.is_on_order else None)
     bands = [(x - allowed, x + allowed) for x in np.unique(promised[np.isfinite(promised)])]
     # the picture shows twice the tolerance; orders far outside are drawn at its edge
     around = np.array([(a - allowed, b + allowed) for a, b in bands]) if bands else order[known]
     shown, bottom, top = np.clip([order, low, high], around.min() - 1.0, around.max() + 1.0)
     limits = style.limits(shown[known], around.ravel())
-    text = f"observed order of {words.symbol(quantity)}"
+    text = f"observed order of {lead.letter}"
     if order.size > FEW:
         ax, bars = _panel(RIGHT, "members (logarithmic)"), ""
         borders = np.linspace(*limits, 41)
@@ -455,7 +444,7 @@ def orders(experiment: Experiment, record: Record, lead: Lead) -> Picture | None
         f"The band is what the tolerance allows around the promised order{bars}."
         + f" {missing} members have no order and are left out." * (not known.all())
         + " The check does not ask about the grey members." * (not checked.all()),
-        f"Observed orders of {words.name(quantity)} of all members",
+        f"Observed orders of {lead.name} of all members",
         ax.get_figure(root=True),
     )
 

@@ -13,13 +13,12 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from vibsim.core.array_types import Floats
-from vibsim.core.record import Record
 from vibsim.report import data, series, style, words
-from vibsim.report.data import Member
+from vibsim.report.data import Ladder
 from vibsim.report.figures import moments, panels
 from vibsim.report.figures.moments import UNBOUNDED
 from vibsim.report.style import Picture
-from vibsim.report.types import Axes, Experiment
+from vibsim.report.types import Axes
 
 MANY_PERIODS = 10.0
 """A run of more periods is long."""
@@ -40,36 +39,31 @@ class Row(NamedTuple):
     group: str | None
 
 
-def long_series(
-    experiment: Experiment, record: Record, quantity: str, member: Member
-) -> Picture | None:
+def long_series(ladder: Ladder) -> Picture | None:
     """Draw a long series; None with few periods, few samples a period, or nothing to compare with.
 
     One scheme is drawn on several levels, several schemes on the coarsest level.
     """
-    t, finest = data.times(record, member.case), data.whole(record, "level")[-1]
-    reference = data.exact_series(record, quantity, member)
+    record, t, reference = ladder.record, ladder.t, ladder.exact
     is_known = bool(np.isfinite(reference).all())
-    if not is_known:
-        reference = data.at(record, f"{quantity}_finest", member)
+    reference = reference if is_known else ladder.finest
     size = data.largest(reference)
     if not np.isfinite(reference).all() or size == 0.0:
         return None
     span = float(t[-1] - t[0])
     period = moments.period(t, reference)
     count = MOST_POINTS / (POINTS_A_PERIOD * span / period)
-    rows = _rows(record, quantity, member, int(np.clip(count / 2, FEWEST_PANELS, MOST_PANELS)))
+    rows = _rows(ladder, int(np.clip(count / 2, FEWEST_PANELS, MOST_PANELS)))
     is_short = span <= MANY_PERIODS * period
     if (
         is_short
         or (len(rows) == 1 and not is_known)
-        or moments.is_undersampled(int(record["steps"][0]), t, (t, reference))
+        or moments.is_undersampled(record.steps[0], t, (t, reference))
     ):
         return None
     # thinning keeps two points of each group of neighbours
     width = max(style.THINNED_POINTS, MOST_POINTS // (4 * len(rows)))
-    letter, measure = words.symbol(quantity), data.unit(record, f"{quantity}_finest")
-    against = series.name_of_exact(experiment) if is_known else f"level {finest}"
+    against = record.name_of_exact if is_known else f"level {record.levels[-1]}"
     gid = f"{style.LONG} {PERIODS * period:.6g}"
     axes = panels.stacked([*[TALL] * len(rows), STRIP], gid)
     look: dict[str, Any] = {"color": style.PALE, "linewidth": 3.5, "zorder": 1, "gid": "compared"}
@@ -77,7 +71,7 @@ def long_series(
     dots: dict[str, Any] = {"marker": "o", "markersize": 2.5} if is_sparse else {}
     pale_points = style.thin(t, reference, width)
     if is_sparse:
-        smooth = series.exact_curve(experiment, record, quantity, member)
+        smooth = series.exact_curve(ladder)
         is_curve = is_known and smooth[0].size > t.size
         pale_points = smooth if is_curve else _smooth(t, reference)
     for i, (ax, row) in enumerate(zip(axes, rows, strict=False)):
@@ -85,39 +79,38 @@ def long_series(
         line = {"color": style.COLOURS[i % style.MANY], "linewidth": 1.2, "gid": row.group} | dots
         _draw(ax, style.thin(t, row.values, width), style.entry(row.label), line)
         ax.set(xlim=(t[0], t[-1]), ylim=(-BEYOND * size, BEYOND * size))
-        ax.set_ylabel(style.label(letter, measure))
+        ax.set_ylabel(style.label(ladder.letter, ladder.unit()))
         style.beside(ax)
     axes[len(rows) - 1].tick_params(labelbottom=True)
     _draw_strip(axes[-1], t, rows[0], reference, size)
-    axes[-1].set_xlabel(data.time_label(record))
+    axes[-1].set_xlabel(record.time_label)
     each = f"panel for each {'level' if rows[0].group else 'scheme'}"
+    case = ladder.member.case_words or f"a {each}"
     return Picture(
-        f"long_{quantity}_{member.stem}",
-        f"{words.title(quantity)}(t) over {span / period:.0f} periods, {member.case_words or f'a {each}'}",
+        f"long_{ladder.stem}",
+        f"{words.title(ladder.quantity)}(t) over {span / period:.0f} periods, {case}",
         f"A {each}, with the {f'{against} solution' if is_known else 'finest level'} in grey. "
         "The strip below has the error of the first panel over the whole time."
         + " Dots: the times that all levels share." * is_sparse
         + " Grey is a spline between them." * (is_sparse and not is_curve),
-        f"{words.name(quantity)} against time, a {each}, over {span / period:.0f} periods",
+        f"{ladder.name} against time, a {each}, over {span / period:.0f} periods",
         axes[0].get_figure(root=True),
     )
 
 
-def _rows(record: Record, quantity: str, member: Member, most: int) -> list[Row]:
-    levels, schemes = data.whole(record, "level"), record.words("scheme")
-    if len(schemes) > 1:
-        members = data.of_case(record, member.case)
-        members.sort(key=lambda one: one.scheme != member.scheme)
+def _rows(ladder: Ladder, most: int) -> list[Row]:
+    levels, steps = ladder.record.levels, ladder.record.steps
+    if len(ladder.record.schemes) > 1:
+        members = ladder.record.of_case(ladder.case)
+        members.sort(key=lambda one: one.scheme != ladder.scheme)
         return [
-            Row(f"{one.scheme_name}, level {levels[0]}", data.state_at(record, quantity, one, 0), None)
+            Row(f"{one.scheme_name}, level {levels[0]}", ladder.with_member(one).on_level(0), None)
             for one in members[:most]
-        ]  # fmt: skip
-    rows = []
-    for i in style.spaced(len(levels), most):
-        steps = words.number(int(record["steps"][i]), "integer")
-        values = data.state_at(record, quantity, member, i)
-        rows.append(Row(f"{steps} steps", values, style.of_level(levels[i])))
-    return rows
+        ]
+    return [
+        Row(f"{words.number(steps[i], 'integer')} steps", ladder.on_level(i), style.of_level(levels[i]))
+        for i in style.spaced(len(levels), most)
+    ]  # fmt: skip
 
 
 def _smooth(t: Floats, x: Floats) -> tuple[Floats, Floats]:

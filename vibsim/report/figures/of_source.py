@@ -5,10 +5,9 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import replace
 
-from vibsim.core.record import Record
 from vibsim.experiment.schema.figures import FigureOfSource
-from vibsim.report import choice, data, words
-from vibsim.report.choice import Lead
+from vibsim.report import words
+from vibsim.report.choice import CheckedLadder
 from vibsim.report.figures import (
     accuracy,
     extrema,
@@ -23,39 +22,34 @@ from vibsim.report.style import Picture
 from vibsim.report.tables.source_figures import PLAYER
 from vibsim.report.types import Experiment
 
-Draw = Callable[[Experiment, Record, Lead], Picture | None]
-
-
-DRAWN: Mapping[str, Draw] = {
-    "phase_plane": lambda e, r, _: plane.phase(e, r, data.all_members(r)),
-    "path": lambda e, r, _: plane.path(e, r, data.all_members(r)),
-    "peaks": lambda e, r, _: extrema.local(e, r, data.all_members(r)),
-    "local_frequency": lambda e, r, _: extrema.frequency(e, r),
-    "growth": lambda e, r, _: theory.growing(e, r),
-    "frequency": lambda e, r, _: accuracy.frequency(e, r),
-    "second_difference": lambda e, r, _: accuracy.second_difference(r),
-    "differences": lambda e, r, lead: time.overlay(r, choice.position(e), lead.member),
-    "energy_error": lambda _, r, lead: (
-        time.energy(r, lead.member) if "energy_deviation_scaled" in r else None
+DRAWN: Mapping[str, Callable[[CheckedLadder], Picture | None]] = {
+    "phase_plane": lambda lead: plane.phase(lead.record, lead.record.all_members),
+    "path": lambda lead: plane.path(lead.record, lead.record.all_members),
+    "peaks": lambda lead: extrema.local(lead.record, lead.record.all_members),
+    "local_frequency": lambda lead: extrema.frequency(lead.record),
+    "growth": lambda lead: theory.growing(lead.record),
+    "frequency": lambda lead: accuracy.frequency(lead.record),
+    "second_difference": lambda lead: accuracy.second_difference(lead.record),
+    "differences": lambda lead: time.overlay(lead.of(lead.record.model.position)),
+    "energy_error": lambda lead: (
+        time.energy(lead.record, lead.member) if "energy_deviation_scaled" in lead.record else None
     ),
-    "grids": lambda e, r, _: model_curves.grids(r),
-    "spring": lambda e, r, _: model_curves.spring(e, r),
-    "spectrum": lambda e, r, lead: spectra.spectrum(e, r, lead.member),
-    "poincare": lambda e, r, _: spectra.poincare(e, r, data.all_members(r)),
+    "grids": lambda lead: model_curves.grids(lead.record),
+    "spring": lambda lead: model_curves.spring(lead.record),
+    "spectrum": lambda lead: spectra.spectrum(lead.record, lead.member),
+    "poincare": lambda lead: spectra.poincare(lead.record, lead.record.all_members),
 }
 """Kind of a figure to its drawing; figures over time, which have options, and the player are special."""
 OF_RECORD = ("local_frequency", "frequency", "second_difference", "grids")
 """Kinds that need no series over time, which a large sweep does not store."""
 
 
-def pictures(
-    experiment: Experiment, record: Record, lead: Lead
-) -> list[tuple[FigureOfSource, list[Picture]]]:
+def pictures(lead: CheckedLadder) -> list[tuple[FigureOfSource, list[Picture]]]:
     """Return the pictures of every figure of the file; none if the data that it shows are not stored."""
     drawn, names = [], set[str]()
-    for i, figure in enumerate(experiment.figures, 1):
+    for i, figure in enumerate(lead.record.experiment.figures, 1):
         titled = []
-        for picture in _drawn(experiment, record, lead, figure, f"source_{i}"):
+        for picture in _drawn(lead, figure, f"source_{i}"):
             # a figure that is named twice is on the page twice
             name = picture.name if picture.name not in names else f"source_{i}_{picture.name}"
             names.add(name)
@@ -65,14 +59,12 @@ def pictures(
     return drawn
 
 
-def _drawn(
-    experiment: Experiment, record: Record, lead: Lead, figure: FigureOfSource, name: str
-) -> list[Picture]:
-    if figure.shows == PLAYER or (figure.shows not in OF_RECORD and data.is_lean(record)):
+def _drawn(lead: CheckedLadder, figure: FigureOfSource, name: str) -> list[Picture]:
+    if figure.shows == PLAYER or (figure.shows not in OF_RECORD and lead.record.is_lean):
         return []
     if figure.shows == "over_time":
-        return over_time.pictures(experiment, record, figure, name)
-    picture = DRAWN[figure.shows](experiment, record, lead)
+        return over_time.pictures(lead.record, figure, name)
+    picture = DRAWN[figure.shows](lead)
     return [] if picture is None else [picture]
 
 

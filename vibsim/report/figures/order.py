@@ -10,14 +10,13 @@ from typing import Any
 import numpy as np
 
 from vibsim.core.array_types import Floats
-from vibsim.core.record import Record
 from vibsim.core.vocabulary import TYPICAL_NORM
-from vibsim.report import data, style, words
+from vibsim.report import style, words
 from vibsim.report.choice import promises
-from vibsim.report.data import Member
+from vibsim.report.data import Ladder, Results
 from vibsim.report.figures.panels import legend_above, rows_of
 from vibsim.report.style import Picture
-from vibsim.report.types import Axes, Experiment
+from vibsim.report.types import Axes
 
 SLOPES: tuple[Any, ...] = ((0, (4, 3)), (0, (1.2, 1.6)), (0, (7, 2, 1.2, 2)), (0, (10, 2)))
 """Dashes of the slopes, if there are several."""
@@ -30,25 +29,24 @@ KINDS: dict[str, tuple[str, dict[str, Any]]] = {
 """Legend entries for filled, hollow and dotted, shared by all schemes."""
 
 
-def against_step(experiment: Experiment, record: Record, quantity: str, case: int) -> Picture:
+def against_step(record: Results, quantity: str, case: int) -> Picture:
     """Draw the norms of differences and errors against the step, and the local order by level."""
-    schemes, many = record.words("scheme"), style.crowded(record)
-    panel = max(2.2, 0.17 * len(schemes)) if many else 2.2
+    many = record.is_crowded
+    panel = max(2.2, 0.17 * len(record.schemes)) if many else 2.2
     second = (6.1, 2.7) if many else (5.0, 3.8)
     figure, (left, right) = rows_of(2, [(0.8, 3.3), second], panel, 0.6, 0.5)
     left.set_gid(style.STEP)
-    members = data.of_case(record, case)
-    kinds = _draw_norms(left, experiment, record, quantity, members)
+    ladders = [Ladder(record, quantity, member) for member in record.of_case(case)]
+    kinds = _draw_norms(left, ladders)
     draw = _draw_each if many else _draw_by_level
-    has_order = _has_order(right, record, quantity, case)
-    is_stated = draw(right, experiment, record, quantity, members) if has_order else None
+    is_stated = draw(right, ladders) if _has_order(right, ladders) else None
     legend_above(figure, left)
-    name = ", ".join(filter(None, [words.symbol(quantity), members[0].case_words]))
+    name = ", ".join(filter(None, [ladders[0].letter, ladders[0].member.case_words]))
     return Picture(
         name=f"order_{quantity}_{case}",
         title=f"How fast does the error shrink? {name}",
-        caption=_caption(kinds, is_stated, many, data.basis_of_order(record, quantity)),
-        alt=f"Norm of the level differences of {words.name(quantity)} against the step, and local order against level",
+        caption=_caption(kinds, is_stated, many, ladders[0].basis_of_order),
+        alt=f"Norm of the level differences of {ladders[0].name} against the step, and local order against level",
         figure=figure,
     )
 
@@ -75,23 +73,17 @@ def _caption(kinds: set[str], is_stated: bool | None, many: bool, basis: str) ->
     )
 
 
-def _draw_norms(
-    ax: Axes, experiment: Experiment, record: Record, quantity: str, members: list[Member]
-) -> set[str]:
+def _draw_norms(ax: Axes, ladders: list[Ladder]) -> set[str]:
     """Draw the norms; return the visible parts, of ``difference``, ``true``, ``slope``, ``floor``."""
-    dt = data.steps_of(record, members[0].case)
+    first, dt = ladders[0], ladders[0].dt
     kinds: dict[str, list[Floats]] = {"difference": [], "true": [], "floor": []}
-    for member in members:
-        if np.isnan(data.formal_order(record, member, quantity)):
+    for ladder in ladders:
+        if np.isnan(ladder.formal_order):
             # an adaptive scheme has no error against dt
             continue
-        look = style.look(member.scheme)
-        difference, true = (
-            style.no_zeros(data.at(record, f"{quantity}_{name}_norm", member))
-            for name in ("difference", "error")
-        )
-        floor = style.no_zeros(data.floor_norm(record, quantity, member, TYPICAL_NORM))
-        name = style.entry(member.scheme_name)
+        look, name = style.look(ladder.scheme), style.entry(ladder.member.scheme_name)
+        norms = ladder.at("difference_norm"), ladder.at("error_norm"), ladder.floor()
+        difference, true, floor = map(style.no_zeros, norms)
         ax.plot(dt[: difference.size], difference, **look, markersize=5, linewidth=1.1, label=name)
         if np.isfinite(true).any():
             hollow = look | KINDS["true"][1] | {"marker": look["marker"], "gid": name}
@@ -110,22 +102,20 @@ def _draw_norms(
         ax.set(xticks=[], yticks=[])
         style.remark(ax, "every difference and error is zero,\nor not finite: nothing to draw")
         return set()
-    orders = list(dict.fromkeys(order for order, _ in promises(experiment, record, quantity)))
-    basis = data.basis_of_order(record, quantity)
+    orders = list(dict.fromkeys(order for order, _ in promises(first.record, first.quantity)))
     visible = {name for name in ("difference", "true") if style.finite(*kinds[name]).size}
     for k, order in enumerate(orders):
         dashes = SLOPES[k % len(SLOPES)] if len(orders) > 1 else None
-        if _reference(ax, dt, measured, order, basis, dashes):
+        if _reference(ax, dt, measured, order, first.basis_of_order, dashes):
             visible.add("slope")
     if _step_limits(ax, dt, measured, kinds["floor"]):
         visible.add("floor")
     for kind, (text, mark) in KINDS.items():
         if kind in visible:
             ax.plot([], [], color=style.GREY, **mark, label=text)
-    ax.set_xlabel(style.label("time step dt", data.time_unit(record, "dt")))
-    measure = data.norm_unit(record, quantity)
-    ax.set_ylabel(style.label(f"{words.USUAL_NORM}, {words.symbol(quantity)}", measure))
-    _level_axis(ax, dt, data.whole(record, "level"))
+    ax.set_xlabel(style.label("time step dt", first.record.time_unit))
+    ax.set_ylabel(style.label(f"{words.USUAL_NORM}, {first.letter}", first.norm_unit()))
+    _level_axis(ax, dt, first.record.levels)
     return visible
 
 
@@ -185,68 +175,61 @@ def _level_axis(ax: Axes, dt: Floats, levels: list[int]) -> None:
     ax.text(-0.02, 1.03, "level", transform=ax.transAxes, ha="right", **above)
 
 
-def _has_order(ax: Axes, record: Record, quantity: str, case: int) -> bool:
+def _has_order(ax: Axes, ladders: list[Ladder]) -> bool:
     """Return whether three levels give an order; if not, the panel says why."""
-    name = f"{quantity}_observed_order"
-    if name in record and np.isfinite(data.pick(record, name, case=case)).any():
+    if any(ladder.has("observed_order") for ladder in ladders):
         return True
-    is_short = len(data.whole(record, "level")) < 3
+    is_short = len(ladders[0].record.levels) < 3
     ax.set(xticks=[], yticks=[])
     why = " it takes three levels" if is_short else "\nno ratio of differences exists"
     style.remark(ax, f"no order of the {words.USUAL_NORM}:{why}")
     return False
 
 
-def _draw_by_level(
-    ax: Axes, experiment: Experiment, record: Record, quantity: str, members: list[Member]
-) -> bool:
+def _draw_by_level(ax: Axes, ladders: list[Ladder]) -> bool:
     """Draw the local orders; return whether an order is stated."""
     from matplotlib.ticker import MaxNLocator
 
-    triples = data.whole(record, "triple")
-    promised = promises(experiment, record, quantity)
+    first, levels, triples = ladders[0], ladders[0].record.levels, ladders[0].record.triples
+    promised = promises(first.record, first.quantity)
     for order, tolerance in promised:
         ax.axhspan(order - tolerance, order + tolerance, **style.ALLOWED)
         ax.axhline(order, **style.REFERENCE)
     sound: list[Floats] = []
     stated = False
-    are_sound = [data.sound_triples(record, quantity, member) for member in members]
-    for member, above in zip(members, are_sound, strict=True):
+    are_sound = [ladder.sound_triples for ladder in ladders]
+    for ladder, above in zip(ladders, are_sound, strict=True):
         if any(map(any, are_sound)) and not any(above):
             # orders of noise could be mistaken for orders
             continue
-        look = style.look(member.scheme)
-        local = data.at(record, f"{quantity}_observed_order", member)
+        look, local = style.look(ladder.scheme), ladder.at("observed_order")
         sound.append(local[above] if any(above) else local)
         ax.plot(triples, local, **look, markersize=5, linewidth=1.1)
-        stated |= draw_stated(ax, record, quantity, member, look["color"])
+        stated |= draw_stated(ax, ladder, look["color"])
     ax.set_ylim(*_order_limits(style.finite(*sound), [order for order, _ in promised]))
-    if len(members) == 1 and len(triples) <= 8:
+    if len(ladders) == 1 and len(triples) <= 8:
         offset: Any = {"xytext": (0, 7), "textcoords": "offset points", "ha": "center"}
         for level, order in zip(triples, local.tolist(), strict=True):
             if np.isfinite(order):
                 text = words.number(order, "order")
                 ax.annotate(text, (level, order), **offset, fontsize=8, annotation_clip=True)
-    levels = data.whole(record, "level")
     ax.set_xlim(levels[0] - 0.5, levels[-1] + 0.5)
     ax.xaxis.set_major_locator(MaxNLocator(nbins=10, integer=True))
     ax.set_xlabel("level (coarsest of three)")
-    ax.set_ylabel(f"local order of {words.symbol(quantity)} ({words.USUAL_NORM})")
+    ax.set_ylabel(f"local order of {first.letter} ({words.USUAL_NORM})")
     return stated
 
 
-def _draw_each(
-    ax: Axes, experiment: Experiment, record: Record, quantity: str, members: list[Member]
-) -> bool:
+def _draw_each(ax: Axes, ladders: list[Ladder]) -> bool:
     """Draw the stated order of every scheme in its own row; return whether any is stated."""
     orders, stated = list[float](), False
-    members = [m for m in members if not np.isnan(data.formal_order(record, m, quantity))]
-    for row, member in enumerate(members):
-        look, promised = style.look(member.scheme), data.formal_order(record, member, quantity)
-        order, low, high = data.stated_order(record, quantity, member)
+    shown = [ladder for ladder in ladders if not np.isnan(ladder.formal_order)]
+    for row, ladder in enumerate(shown):
+        look, promised = style.look(ladder.scheme), ladder.formal_order
+        order, low, high = ladder.stated_order()
         is_stated = bool(np.isfinite(order))
         stated |= is_stated
-        last = data.at(record, f"{quantity}_observed_order", member)[-1]
+        last = ladder.at("observed_order")[-1]
         value, face = (order, look["color"]) if is_stated else (float(last), "white")
         ax.plot([low, high], [row, row], color=look["color"], linewidth=3.0, alpha=0.35)
         ax.plot([value], [row], **look | {"markerfacecolor": face, "markersize": 5})
@@ -254,19 +237,17 @@ def _draw_each(
         orders += [x for x in (promised, value if is_stated else promised) if np.isfinite(x)]
     if orders:
         ax.set_xlim(min(orders) - 0.6, max(orders) + 0.6)
-    names = [style.entry(member.scheme_name) for member in members]
-    ax.set_yticks(range(len(members)), names, fontsize=7.5)
-    ax.set_ylim(len(members) - 0.4, -0.6)
-    ax.set_xlabel(f"order of {words.symbol(quantity)} ({words.USUAL_NORM})")
+    names = [style.entry(ladder.member.scheme_name) for ladder in shown]
+    ax.set_yticks(range(len(shown)), names, fontsize=7.5)
+    ax.set_ylim(len(shown) - 0.4, -0.6)
+    ax.set_xlabel(f"order of {ladders[0].letter} ({words.USUAL_NORM})")
     return stated
 
 
-def draw_stated(
-    ax: Axes, record: Record, quantity: str, member: Member, colour: str, norm: str = TYPICAL_NORM
-) -> bool:
+def draw_stated(ax: Axes, ladder: Ladder, colour: str, norm: str = TYPICAL_NORM) -> bool:
     """Draw the stated order as a bar over the levels of its window, with its interval; return whether there is one."""
-    order, low, high = data.stated_order(record, quantity, member, norm)
-    first, last = data.window(record, quantity, member)
+    order, low, high = ladder.stated_order(norm)
+    first, last = ladder.window
     if not np.isfinite([order, low, high]).all() or last <= first:
         return False
     ends = [first, last]

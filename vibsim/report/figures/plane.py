@@ -12,14 +12,11 @@ from typing import Any
 import numpy as np
 
 from vibsim.core.array_types import Flags, Floats
-from vibsim.core.record import Record
-from vibsim.models import Model
 from vibsim.report import data, style, words
-from vibsim.report.data import Member, state_at, unit, whole
+from vibsim.report.data import Ladder, Member, Results
 from vibsim.report.figures.panels import legend_above, rows_of
-from vibsim.report.series import name_of_exact
 from vibsim.report.style import Picture
-from vibsim.report.types import Axes, Experiment
+from vibsim.report.types import Axes
 
 PANELS_A_ROW = 3  # panels in a row of the phase plane, and most panels of the path
 MOST_PANELS = 6  # most panels of the phase plane, and most schemes in them
@@ -35,22 +32,22 @@ SEEN = 0.01  # smallest visible difference of two paths, relative to their size
 Points = tuple[Floats, Floats]
 
 
-def phase(experiment: Experiment, record: Record, shown: list[Member]) -> Picture | None:
+def phase(record: Results, shown: list[Member]) -> Picture | None:
     """Draw the phase plane of the schemes in `shown`, one panel per level.
 
     None for many schemes, without a natural frequency, for few samples a period, and for a body at rest.
     """
-    model = experiment.model.definition
+    model = record.model
     if not shown or len({member.scheme for member in shown}) > MOST_PANELS:
         return None
     case = shown[0].case
     members = [member for member in shown if member.case == case]
-    w, t = data.natural_frequency(record, case), data.times(record, case)
-    exact = float(data.exact_periods(record)[case])
+    w, t = record.natural_frequency(case), record.times(case)
+    exact = float(record.exact_periods[case])
     period = exact if math.isfinite(exact) else 2.0 * math.pi / w if w > 0.0 else math.nan
     if not math.isfinite(w) or w <= 0.0 or period < FEWEST_SAMPLES * float(t[1] - t[0]):
         return None
-    levels, dt = whole(record, "level"), data.steps_of(record, case)
+    levels, dt = record.levels, record.dt(case)
     chosen = style.spaced(len(levels), MOST_PANELS)
     columns = [(0.62 + 2.75 * i, 2.35) for i in range(PANELS_A_ROW)]
     figure, axes = rows_of(len(chosen), columns, 2.35, 0.5, 0.45)
@@ -61,12 +58,10 @@ def phase(experiment: Experiment, record: Record, shown: list[Member]) -> Pictur
     # a closed orbit is drawn once, any other for the times of the levels
     closes = math.isfinite(exact)
     orbit = t <= 1.02 * period if closes else np.any([keep for keep, _ in parts], axis=0)
-    name = name_of_exact(experiment)
-    size = _draw_orbit(axes, record, model, case, w, orbit, name)
-    largest = 0.0
+    size, largest = _draw_orbit(axes, record, case, w, orbit), 0.0
     for ax, i in zip(axes, chosen, strict=True):
         for k, member in enumerate(members):
-            u, v = (state_at(record, name, member, i) for name in (model.position, model.velocity))
+            u, v = _points(record, (model.position, model.velocity), member, i)
             v = v / w
             for keep, width in parts:
                 colour = style.look(k)["color"]
@@ -78,7 +73,7 @@ def phase(experiment: Experiment, record: Record, shown: list[Member]) -> Pictur
     if edge == 0.0:
         # at rest
         return None
-    letter, measure = words.symbol(model.position), unit(record, f"{model.position}_finest")
+    letter, measure = words.symbol(model.position), record.unit(f"{model.position}_finest")
     for n, ax in enumerate(axes):
         ax.set(xlim=(-edge, edge), ylim=(-edge, edge), aspect="equal")
         ax.set_xlabel(style.label(letter, measure))
@@ -91,28 +86,27 @@ def phase(experiment: Experiment, record: Record, shown: list[Member]) -> Pictur
         title="Phase plane: velocity against position",
         caption=drawn_text
         * is_long
-        + f"Black, dashed: the {name} orbit. The marker is the end of the motion. A spiral outwards gains energy, one "
-        "inwards loses it; an orbit that closes beside it conserves an energy of its own.",
+        + f"Black, dashed: the {record.name_of_exact} orbit. The marker is the end of the motion. "
+        "A spiral outwards gains energy, one inwards loses it; an orbit that closes beside it conserves an energy of "
+        "its own.",
         alt="Velocity over the natural frequency against position for each level",
         figure=figure,
     )
 
 
-def _draw_orbit(
-    axes: list[Axes], record: Record, model: Model, case: int, w: float, drawn: Flags, label: str
-) -> float:
+def _draw_orbit(axes: list[Axes], record: Results, case: int, w: float, drawn: Flags) -> float:
     """Draw the exact orbit or that of the reference, and return its size; 0 if it is unknown."""
-    names = f"{model.position}_exact", f"{model.velocity}_exact"
+    names = f"{record.model.position}_exact", f"{record.model.velocity}_exact"
     if any(name not in record for name in names):
         return 0.0
-    series = (np.asarray(data.pick(record, name, case=case), np.float64) for name in names)
+    series = (np.asarray(record.pick(name, case=case), np.float64) for name in names)
     u, v = (np.where(drawn, values, np.nan) for values in series)
-    if model.linear:
+    if record.model.linear:
         angle = np.linspace(0.0, 2.0 * np.pi, 121)
         radius = float(np.hypot(u[0], v[0] / w))
         u, v = radius * np.cos(angle), radius * w * np.sin(angle)
     for ax in axes:
-        ax.plot(u, v / w, **style.REFERENCE | {"zorder": 5}, label=label)
+        ax.plot(u, v / w, **style.REFERENCE | {"zorder": 5}, label=record.name_of_exact)
     return float(np.nanmax(np.hypot(u, v / w)))
 
 
@@ -123,7 +117,7 @@ def _draw_end(ax: Axes, points: Points, k: int, width: float, name: str) -> None
     ax.plot(points[0][last], points[1][last], **look, label=style.entry(name))
 
 
-def path(experiment: Experiment, record: Record, shown: list[Member]) -> Picture | None:
+def path(record: Results, shown: list[Member]) -> Picture | None:
     """Draw the paths of the schemes in `shown`: one panel per level, or per member of a sweep at the finest level.
 
     None unless the model has two coordinates, and if all paths run along a line, such as those of two points of a beam
@@ -131,18 +125,18 @@ def path(experiment: Experiment, record: Record, shown: list[Member]) -> Picture
     """
     from matplotlib.ticker import MaxNLocator
 
-    model = experiment.model.definition
+    model = record.model
     if model.coordinates != 2 or not shown:
         return None
-    names, levels = model.positions[:2], whole(record, "level")
-    if data.swept(record):
+    names, levels = model.positions[:2], record.levels
+    if record.swept:
         cases = sorted({member.case for member in shown})[:PANELS_A_ROW]
         groups = [[member for member in shown if member.case == case] for case in cases]
         panels = [(group[0].case_words, group, len(levels) - 1) for group in groups]
     else:
         panels = [(f"level {levels[i]}", shown, i) for i in style.spaced(len(levels), PANELS_A_ROW)]
     curves = [[_points(record, names, m, level) for m in members] for _, members, level in panels]
-    if not data.swept(record):
+    if not record.swept:
         # levels that look like the finest one are left out
         last = len(curves) - 1
         distinct = [
@@ -151,7 +145,7 @@ def path(experiment: Experiment, record: Record, shown: list[Member]) -> Picture
         panels, curves = [panels[i] for i in distinct], [curves[i] for i in distinct]
     if all(_is_line(points) for paths in curves for points in paths):
         return None
-    name = name_of_exact(experiment)
+    name = record.name_of_exact
     references = [_points(record, names, members[0], None) for _, members, _ in panels]
     is_known = [bool(np.isfinite(reference).all()) for reference in references]
     rows = zip(references, is_known, curves, strict=True)
@@ -163,7 +157,7 @@ def path(experiment: Experiment, record: Record, shown: list[Member]) -> Picture
     tall = min(wide * (high - low) / (right - left), TALLEST)
     figure, axes = rows_of(len(panels), [(0.75, wide)], tall, 0.5, 0.3)
     ticks = max(2, int(tall * (right - left) / (high - low) / TICK))
-    labels = [style.label(words.symbol(name), unit(record, f"{name}_finest")) for name in names]
+    labels = [style.label(words.symbol(name), record.unit(f"{name}_finest")) for name in names]
     for i, (title, members, _) in enumerate(panels):
         # from thick to thin, so that no scheme hides another
         for k, (member, (x, y)) in enumerate(zip(members, curves[i], strict=True)):
@@ -188,13 +182,10 @@ def path(experiment: Experiment, record: Record, shown: list[Member]) -> Picture
     )
 
 
-def _points(record: Record, names: tuple[str, ...], member: Member, level: int | None) -> Points:
+def _points(record: Results, names: tuple[str, ...], member: Member, level: int | None) -> Points:
     """Return the path of a member on a level, or the exact one (None), which is NaN if unknown."""
-    if level is None:
-        x, y = (data.exact_series(record, name, member) for name in names)
-    else:
-        x, y = (state_at(record, name, member, level) for name in names)
-    return x, y
+    x, y = (Ladder(record, name, member) for name in names)
+    return (x.exact, y.exact) if level is None else (x.on_level(level), y.on_level(level))
 
 
 def _is_line(points: Points) -> bool:

@@ -10,12 +10,11 @@ from typing import Any
 import numpy as np
 
 from vibsim.core.array_types import Floats
-from vibsim.core.record import Record
 from vibsim.report import data, series, style, words
-from vibsim.report.data import Member
+from vibsim.report.data import Ladder, Results
 from vibsim.report.figures import moments, panels
 from vibsim.report.style import Picture
-from vibsim.report.types import Axes, Experiment
+from vibsim.report.types import Axes
 
 MOST = 6  # most levels that can be told apart
 Look = dict[str, Any]
@@ -30,30 +29,26 @@ DOTS: Look = {"linestyle": "none", "marker": ".", "markersize": 3.0}
 """Replaces a line if the samples are too few for one."""
 
 
-def solution(experiment: Experiment, record: Record, quantity: str, member: Member) -> Picture:
+def solution(ladder: Ladder) -> Picture:
     """Draw the solution and, below it on a logarithmic scale, its estimated and its true error."""
-    t, letter = data.times(record, member.case), words.symbol(quantity)
-    measure = data.unit(record, f"{quantity}_finest")
-    exact = data.exact_series(record, quantity, member)
-    best, bound = (data.at(record, f"{quantity}_richardson{end}", member) for end in ("", "_error"))
+    t, letter, measure, exact = ladder.t, ladder.letter, ladder.unit(), ladder.exact
+    best, bound = ladder.at("richardson"), ladder.at("richardson_error")
     is_known = bool(np.isfinite(exact).any())
     axes = panels.stacked([2.3, 2.5], style.TIME)
-    finest = data.at(record, f"{quantity}_finest", member)
-    name = series.name_of_exact(experiment)
-    _draw_solution(axes[0], t, finest, best, exact, name, data.whole(record, "level")[-1])
+    _draw_solution(axes[0], ladder, best, exact)
     axes[0].set(ylabel=style.label(letter, measure), title=f"Solution {letter}(t)")
     thickness = _draw_band(axes[0], t, best, bound, measure)
-    _draw_errors(axes[1], t, record, quantity, member, bound, exact - best)
+    _draw_errors(axes[1], ladder, bound, exact - best)
     axes[1].set_ylabel(style.label(f"|error of {letter}|", measure))
     axes[1].set_title("Estimated beside true error" if is_known else "Estimated error")
-    axes[1].set_xlabel(data.time_label(record))
+    axes[1].set_xlabel(ladder.record.time_label)
     dots = " (lines), and the true error (dots). Dots on the lines mean that the estimate can be trusted"
     return Picture(
-        name=f"solution_{quantity}_{member.stem}",
-        title=f"Solution with its error: {letter}, {member.title}",
+        name=f"solution_{ladder.stem}",
+        title=f"Solution with its error: {letter}, {ladder.title}",
         caption=f"Top: the finest level, and the value extrapolated from the two finest ones with its error bar"
         f"{thickness}. Bottom: the error that the difference of two levels predicts{dots * is_known}.",
-        alt=f"{words.name(quantity)} against time for {member.title}, and its estimated error on a logarithmic scale",
+        alt=f"{ladder.name} against time for {ladder.title}, and its estimated error on a logarithmic scale",
         figure=axes[0].get_figure(root=True),
     )
 
@@ -73,9 +68,8 @@ def _draw_band(ax: Axes, t: Floats, centre: Floats, bound: Floats, measure: str)
     return f" (the band, {size})"
 
 
-def _draw_solution(
-    ax: Axes, t: Floats, finest: Floats, best: Floats, exact: Floats, name: str, level: int
-) -> None:
+def _draw_solution(ax: Axes, ladder: Ladder, best: Floats, exact: Floats) -> None:
+    finest, level, name = ladder.finest, ladder.record.levels[-1], ladder.record.name_of_exact
     pale: dict[str, Any] = {"color": BAND, "linewidth": 4.5, "alpha": 0.7}
     solid: dict[str, Any] = {"color": "#0072B2", "linewidth": 1.4, "gid": style.of_level(level)}
     dotted: dict[str, Any] = {"color": "black", "linewidth": 1.4, "linestyle": (0, (1, 3))}
@@ -86,8 +80,8 @@ def _draw_solution(
     ]
     rows = [row for row in rows if np.isfinite(row[0]).any()]
     for y, text, look in rows:
-        ax.plot(*style.thin(t, y), label=text, **look)
-    panels.stop_at_breakdown(ax, t, [finest])
+        ax.plot(*style.thin(ladder.t, y), label=text, **look)
+    panels.stop_at_breakdown(ax, ladder.t, [finest])
     drawn = [y for y, _, _ in rows]
     # a run that blew up would hide the others
     finite = [y for y in drawn if np.isfinite(y).all()] or drawn
@@ -100,11 +94,9 @@ def _draw_solution(
     style.beside(ax)
 
 
-def _draw_errors(
-    ax: Axes, t: Floats, record: Record, quantity: str, member: Member, bound: Floats, true: Floats
-) -> None:
+def _draw_errors(ax: Axes, ladder: Ladder, bound: Floats, true: Floats) -> None:
     """Draw the estimates from the coarsest and finest pairs of levels, and the bound of the extrapolated solution."""
-    pairs = data.whole(record, "pair")
+    t, pairs = ladder.t, ladder.record.pairs
     drawn: list[Floats] = []
 
     def add(line: Floats, dots: Floats, label: str, true_label: str, **look: Any) -> None:
@@ -119,59 +111,51 @@ def _draw_errors(
             mark |= {"markerfacecolor": "white", "markeredgewidth": 0.9}
             ax.plot(t[subset], dots[subset], label=true_label, **look | mark)
 
-    estimates = [
-        data.at(record, f"{quantity}_error_estimate", member, pair=i) for i in range(len(pairs))
-    ]
+    estimates = [ladder.at("error_estimate", pair=i) for i in range(len(pairs))]
     # errors of runs that blew up are drawn only if all did
     finite = [i for i, estimate in enumerate(estimates) if np.isfinite(estimate).all()]
     chosen = finite or list(range(len(pairs)))
     for k, i in enumerate(dict.fromkeys([chosen[0], chosen[-1]]) if chosen else []):
-        error = data.at(record, f"{quantity}_error", member, pair=i)
-        text = f"level {pairs[i]}"
+        error, text = ladder.at("error", pair=i), f"level {pairs[i]}"
         look = {"color": style.COLOURS[k], "linestyle": style.DASHES[k]}
         look["gid"] = style.of_level(pairs[i])
         add(estimates[i], error, f"estimate, {text}", f"true, {text}", **look)
     if np.isfinite(bound).all():
-        label, true_label = "bound, extrapolated", "true, extrapolated"
-        add(bound, true, label, true_label, color=style.COLOURS[2])
+        add(bound, true, "bound, extrapolated", "true, extrapolated", color=style.COLOURS[2])
     # dips at zero crossings may lie below the axis
     if not style.fit_log_axis(ax, "y", *drawn, below=0.03, least=TINY):
         style.remark(ax, "no error to draw: it is zero, or not known")
     style.beside(ax)
 
 
-def motion(experiment: Experiment, record: Record, quantity: str, member: Member) -> Picture:
+def motion(ladder: Ladder) -> Picture:
     """Draw a quantity on all levels, and their distance from the exact, else the extrapolated, else the finest one.
 
     Nothing can be extrapolated where the verdict on the levels is open.
     """
-    t, letter = data.times(record, member.case), words.symbol(quantity)
-    measure, levels = data.unit(record, f"{quantity}_finest"), data.whole(record, "level")
-    exact = data.exact_series(record, quantity, member)
-    is_known = bool(np.isfinite(exact).any())
-    finest = data.at(record, f"{quantity}_finest", member)
-    name, text, best = f"{quantity}_richardson", series.name_of_exact(experiment), exact
+    t, letter, measure, levels = ladder.t, ladder.letter, ladder.unit(), ladder.record.levels
+    text, best = ladder.record.name_of_exact, ladder.exact
+    is_known = bool(np.isfinite(best).any())
     if not is_known:
-        is_open = (
-            name not in record or data.is_undecided(record, quantity)[member.scheme, member.case]
-        )
-        text, best = (
-            ("finest", finest) if is_open else ("extrapolated", data.at(record, name, member))
-        )
+        is_open = "richardson" not in ladder or ladder.is_undecided
+        text, field = ("finest", "finest") if is_open else ("extrapolated", "richardson")
+        best = ladder.at(field)
     chosen = style.spaced(len(levels), MOST)
-    runs = {i: data.state_at(record, quantity, member, i) for i in chosen}
+    runs = {i: ladder.on_level(i) for i in chosen}
     has_errors = bool(np.isfinite(best).any()) and len(levels) > (0 if is_known else 1)
     axes = panels.stacked([2.3, *[1.7] * has_errors], style.TIME)
-    smooth = series.exact_curve(experiment, record, quantity, member) if is_known else (t, best)
-    turns = smooth if is_known else (t, finest)
-    dotted = [i for i in chosen if moments.is_undersampled(int(record["steps"][i]), t, turns)]
+    smooth = series.exact_curve(ladder) if is_known else (t, best)
+    turns, steps = smooth if is_known else (t, ladder.finest), ladder.record.steps
+    dotted = [i for i in chosen if moments.is_undersampled(steps[i], t, turns)]
     is_dotted = bool(dotted)
     if has_errors:
         pale: Look = {"color": style.PALE, "linewidth": 5.0, "label": text, "zorder": 1}
         is_line = not is_dotted or smooth[0].size > t.size
         dots: Look = {} if is_line else DOTS | {"markersize": 6.0}
         axes[0].plot(*style.thin(*smooth), **pale | dots)
-    looks = {i: _look(k, record, i) | (DOTS if i in dotted else {}) for k, i in enumerate(chosen)}
+    looks = {
+        i: _look(k, ladder.record, i) | (DOTS if i in dotted else {}) for k, i in enumerate(chosen)
+    }
     _draw_levels(axes[0], t, runs, looks, best)
     title = f"{letter}(t){' at the stored times only' if is_dotted else ''}"
     axes[0].set(ylabel=style.label(letter, measure), title=title)
@@ -181,25 +165,25 @@ def motion(experiment: Experiment, record: Record, quantity: str, member: Member
         axes[1].set_title(f"Each level minus the {text} solution", fontweight="normal", fontsize=9)
         what = "difference" if text == "finest" else "error"
         axes[1].set_ylabel(style.label(f"{what} of {letter}", measure, exponent))
-    axes[-1].set_xlabel(data.time_label(record))
+    axes[-1].set_xlabel(ladder.record.time_label)
     told = " Not every level is drawn." * (len(chosen) < len(levels))
     told += " Dots: the stored samples, which are too few for lines between them." * is_dotted
     guide = f"Wide and grey is the {text} solution, the lines are the levels; below it, how far each level is from it."
     return Picture(
-        f"motion_{quantity}_{member.stem}",
-        f"{words.title(quantity)}(t), {member.title}",
+        f"motion_{ladder.stem}",
+        f"{words.title(ladder.quantity)}(t), {ladder.title}",
         (guide if has_errors else "Each line is a level.") + told,
-        f"{words.name(quantity)} against time on all levels for {member.title}"
+        f"{ladder.name} against time on all levels for {ladder.title}"
         + ", and the error of each level" * has_errors,
         axes[0].get_figure(root=True),
     )
 
 
-def _look(k: int, record: Record, i: int) -> Look:
+def _look(k: int, record: Results, i: int) -> Look:
     """Return the look of the k-th line, of the level at position `i`."""
-    steps = words.number(int(record["steps"][i]), "integer")
+    steps = words.number(record.steps[i], "integer")
     look = {"color": style.COLOURS[k % style.MANY], "linewidth": 1.3, "label": f"{steps} steps"}
-    return look | {"gid": style.of_level(data.whole(record, "level")[i])}
+    return look | {"gid": style.of_level(record.levels[i])}
 
 
 def _draw_levels(

@@ -11,12 +11,10 @@ from typing import Any
 
 import numpy as np
 
-from vibsim.core.record import Record
-from vibsim.report import choice, data, style, words
-from vibsim.report.data import Member, state_at, whole
+from vibsim.report import data, style
+from vibsim.report.data import Ladder, Member, Results
 from vibsim.report.figures import panels
 from vibsim.report.style import Picture
-from vibsim.report.types import Experiment
 
 LOWEST = 1e-8  # lower end of the axis over the highest line
 MOST_LEVELS = 3  # finest levels in the spectrum
@@ -24,7 +22,7 @@ MOST_PANELS = 6  # most sections
 PANELS_A_ROW = 3
 
 
-def spectrum(experiment: Experiment, record: Record, member: Member) -> Picture | None:
+def spectrum(record: Results, member: Member) -> Picture | None:
     """Draw the amplitudes of the spectral lines at the finest levels, with the exact and the predicted frequencies.
 
     None if there are too few samples for a line.
@@ -32,8 +30,12 @@ def spectrum(experiment: Experiment, record: Record, member: Member) -> Picture 
     # few pages have a spectrum
     from vibsim.observe import spectrum as observed
 
-    name = choice.position(experiment)
-    t, levels = data.times(record, member.case), whole(record, "level")
+    ladder, levels, model = (
+        Ladder(record, record.model.position, member),
+        record.levels,
+        record.model,
+    )
+    t = ladder.t
     if t.size < 2 * observed.FIRST_LINE + 4:
         return None
     w = 2.0 * math.pi / float(t[-1] - t[0]) * np.arange(t.size // 2 + t.size % 2)
@@ -41,32 +43,30 @@ def spectrum(experiment: Experiment, record: Record, member: Member) -> Picture 
     highest, last = 0.0, 0.0
     chosen = range(max(len(levels) - MOST_LEVELS, 0), len(levels))
     for k, level in enumerate(chosen):
-        amplitudes = observed.lines(state_at(record, name, member, level))
+        amplitudes = observed.lines(ladder.on_level(level))
         frequencies, values = w[: amplitudes.size], amplitudes[: w.size]
         colour, text = style.look(k)["color"], f"level {levels[level]}"
         ax.plot(frequencies, values, color=colour, linewidth=1.0, label=text)
         top = data.largest(amplitudes)
         highest = max(highest, top)
         last = max(last, float(frequencies[values > 1e-3 * top].max(initial=0.0)))
-        predicted = _predicted(experiment, record, member, level)
+        predicted = _predicted(record, member, level)
         if math.isfinite(predicted):
             look: Any = {"color": colour, "linestyle": ":", "linewidth": 1.2}
             ax.axvline(predicted, **look, label=f"theory, {text}")
     if not highest > 0.0:
         return None
-    model = experiment.model.definition
-    exact = data.natural_frequency(record, member.case)
+    exact = record.natural_frequency(member.case)
     if model.linear and math.isfinite(exact):
         ax.axvline(exact, label="natural", **style.REFERENCE)
     style.log_axis(ax, "y", LOWEST * highest, 3.0 * highest)
     ax.set_xlim(0.0, min(float(w[-1]), 4.0 * np.fmax(last, exact)))
-    ax.set_xlabel(style.label("angular frequency", data.radians_unit(record)))
-    measure = data.unit(record, f"{name}_finest")
-    ax.set_ylabel(style.label(f"amplitude of {words.symbol(name)}", measure))
+    ax.set_xlabel(style.label("angular frequency", record.radians_unit))
+    ax.set_ylabel(style.label(f"amplitude of {ladder.letter}", ladder.unit()))
     style.beside(ax)
     return Picture(
         f"spectrum_{member.case}",
-        f"Spectrum of {words.symbol(name)}, {member.scheme_name}",
+        f"Spectrum of {ladder.letter}, {member.scheme_name}",
         style.sentences(
             "The amplitudes of the frequencies in the stored series less its mean, with Hann's window.",
             "Dotted: the frequency that the scheme itself has by theory. Its distance from the natural one, dashed, is "
@@ -77,48 +77,47 @@ def spectrum(experiment: Experiment, record: Record, member: Member) -> Picture 
     )
 
 
-def _predicted(experiment: Experiment, record: Record, member: Member, level: int) -> float:
+def _predicted(record: Results, member: Member, level: int) -> float:
     """Return the angular frequency of a scheme's discrete solution by theory; NaN if theory gives none."""
     from vibsim import theory
 
-    model, spec = experiment.model.definition, experiment.schemes[member.scheme]
+    model, spec = record.model, record.experiment.schemes[member.scheme]
     if spec.method.adaptive or not (model.linear and model.conservative):
         return math.nan
-    p = data.omega_dt(record)[member.case, level : level + 1]
+    p = record.omega_dt[member.case, level : level + 1]
     with np.errstate(all="ignore"):
         error = theory.phase_error_per_period(spec.method.stepper(spec.options), p)
-    return data.natural_frequency(record, member.case) / float(1.0 - error[0])
+    return record.natural_frequency(member.case) / float(1.0 - error[0])
 
 
-def poincare(experiment: Experiment, record: Record, shown: list[Member]) -> Picture | None:
+def poincare(record: Results, shown: list[Member]) -> Picture | None:
     """Draw position and velocity of each member after every period of the force, in the second half of the run.
 
     The end is left out, where a scheme may find the velocity by another formula, with a larger error.
     """
-    model, periods = experiment.model.definition, experiment.time.periods
+    model, periods = record.model, record.experiment.time.periods
     first = [member for member in shown if member.scheme == shown[0].scheme][:MOST_PANELS]
     if periods is None or not first:
         return None
     columns = [(0.72 + 2.7 * i, 2.1) for i in range(PANELS_A_ROW)]
     figure, axes = panels.rows_of(len(first), columns, 2.1, 0.45, 0.5)
-    finest = len(whole(record, "level")) - 1
-    units = [data.unit(record, f"{name}_finest") for name in (model.position, model.velocity)]
+    states = [Ladder(record, name, first[0]) for name in (model.position, model.velocity)]
     drawn = []
     for ax, member in zip(axes, first, strict=True):
-        u, v = (state_at(record, name, member, finest) for name in (model.position, model.velocity))
+        u, v = (state.with_member(member).finest for state in states)
         n = (u.size - 1) // round(periods)
         u, v = (values[:-1:n][round(periods) // 2 :] for values in (u, v))
         ax.plot(u, v, linestyle="none", marker=".", markersize=3.0, color=style.look(0)["color"])
         ax.set_title(member.case_words or member.scheme_name)
-        ax.set_xlabel(style.label(words.symbol(model.position), units[0]))
+        ax.set_xlabel(style.label(states[0].letter, states[0].unit()))
         drawn.append((u, v))
     for ax in axes:
         ax.set(xlim=style.limits(*(u for u, _ in drawn)), ylim=style.limits(*(v for _, v in drawn)))
-    axes[0].set_ylabel(style.label(words.symbol(model.velocity), units[1]))
+    axes[0].set_ylabel(style.label(states[1].letter, states[1].unit()))
     return Picture(
         "poincare",
         "Poincaré section: the state after every period of the force",
-        f"The second half of the run, at level {whole(record, 'level')[-1]}. A motion with the period of the force is "
+        f"The second half of the run, at level {record.levels[-1]}. A motion with the period of the force is "
         "one point, one that returns after k of its periods k points, and a chaotic one a set that never closes.",
         "Velocity against position at the beginning of every period of the force",
         figure,

@@ -12,13 +12,11 @@ from typing import Any
 import numpy as np
 
 from vibsim.core.array_types import Floats
-from vibsim.core.record import Record
 from vibsim.core.vocabulary import MEMBER, OF_LEVEL
 from vibsim.report import choice, data, frame, style, words
-from vibsim.report.choice import position
-from vibsim.report.data import Member, omega_dt, optional
+from vibsim.report.data import Ladder, Member, Results
 from vibsim.report.figures.panels import stacked
-from vibsim.report.series import exact_curve, name_of_exact
+from vibsim.report.series import exact_curve
 from vibsim.report.style import Picture
 from vibsim.report.tables.theory import predicted
 from vibsim.report.types import Axes, Experiment
@@ -38,27 +36,27 @@ LEAVES_FRAME = 100.0
 """Curves on the linear scale end at this multiple of the exact solution, outside the frame."""
 
 
-def order_and_stability(experiment: Experiment, record: Record) -> Picture | None:
+def order_and_stability(record: Results) -> Picture | None:
     """Draw ``|growth per period − 1|`` and the phase error per period against w dt.
 
     None if theory predicts nothing, or for fewer than two values of w dt in levels and members.
     """
-    p = omega_dt(record)
+    p = record.omega_dt
     if not predicted(record) or np.unique(p[np.isfinite(p) & (p > 0.0)]).size < 2:
         return None
     growth = [
-        optional(record, f"{origin}_growth", OF_LEVEL) - 1.0 for origin in ("theory", "measured")
+        record.optional(f"{origin}_growth", OF_LEVEL) - 1.0 for origin in ("theory", "measured")
     ]
-    phase = [data.phase_error(record, origin) for origin in ("theory", "measured")]
+    phase = [record.phase_error(origin) for origin in ("theory", "measured")]
     axes = stacked([2.9, 2.9])
     lowest, highest = float(np.min(style.finite(p[p > 0.0]))), float(np.nanmax(p))
     grid = np.geomspace(0.9 * lowest, 1.1 * highest, CURVE_POINTS)
-    curves = [_theory(experiment, s, grid) for s in range(len(record["scheme"]))]
-    limits = optional(record, "stability_limit", MEMBER)[:, 0]
+    curves = [_theory(record.experiment, s, grid) for s in range(len(record.schemes))]
+    limits = record.optional("stability_limit", MEMBER)[:, 0]
     for k, (ax, (from_theory, measured)) in enumerate(zip(axes, (growth, phase), strict=True)):
         # schemes without theory, such as adaptive ones, have no w dt
         shown = np.where(np.isnan(from_theory), np.nan, measured)
-        for s, name in enumerate(record.words("scheme")):
+        for s, name in enumerate(record.schemes):
             if np.isnan(from_theory[s]).all():
                 continue
             look, curve = style.look(s), curves[s]
@@ -71,13 +69,13 @@ def order_and_stability(experiment: Experiment, record: Record) -> Picture | Non
                     ax.plot(grid, np.where(keep, size, np.nan), color=look["color"], **line)
             _dots(ax, p, shown[s], look, style.entry(name))
         _finish(ax, from_theory, shown, limits, grid)
-    alike = _alike(record.words("scheme"), curves)
+    alike = _alike(record.schemes, curves)
     axes[0].set_ylabel("|growth per period − 1|")
     axes[0].set_title("Growth of the amplitude: filled grows, hollow decays")
     axes[1].set_title("Phase error per period: filled comes early, hollow late")
     axes[1].set(xlabel="w dt", ylabel="|phase error| / period")
     style.beside(axes[0], fontsize=8, handlelength=1.6)
-    if not style.crowded(record):
+    if not record.is_crowded:
         # in the upper panel below the legend
         rows = len(axes[0].get_legend_handles_labels()[0]) + 2
         for ax, kind, below in zip(axes, KINDS, ("\n" * rows, ""), strict=True):
@@ -181,19 +179,16 @@ def _finish(ax: Axes, from_theory: Floats, measured: Floats, limits: Floats, gri
             ax.plot([limit], [1.0], marker="v", color=style.look(s)["color"], markersize=5, **edge)
 
 
-def growing(experiment: Experiment, record: Record) -> Picture | None:
+def growing(record: Results) -> Picture | None:
     """Draw the runs with w dt at or beyond the limit of stability, and their predicted growth; None without any."""
     runs = _unstable(record)
     if not runs:
         return None
-    quantity = position(experiment)
-    letter, measure = words.symbol(quantity), data.unit(record, f"{quantity}_finest")
     upper, lower = stacked([2.2, 2.6], style.TIME)
     sizes, reference = [], 0.0
     for k, (member, level) in enumerate(runs):
-        t, colour = data.times(record, member.case), style.look(k)["color"]
-        values = data.state_at(record, quantity, member, level)
-        exact = data.exact_series(record, quantity, member)
+        ladder, colour = Ladder(record, record.model.position, member), style.look(k)["color"]
+        t, values, exact = ladder.t, ladder.on_level(level), ladder.exact
         most = data.largest(exact)
         reference = max(reference, most)
         if k == 0 or np.mean(np.abs(values) <= FULLY_DRAWN * most) >= SEEN:
@@ -206,29 +201,29 @@ def growing(experiment: Experiment, record: Record) -> Picture | None:
         sizes.append(size)
         text = _run_label(record, member, level)
         lower.plot(*style.thin(t, size), color=colour, linewidth=0.9, label=text)
-        growth = data.at(record, "theory_growth", member, level=level).item()
-        w = data.natural_frequency(record, member.case)
+        growth = record.at("theory_growth", member, level=level).item()
+        w = record.natural_frequency(member.case)
         if math.isfinite(growth) and math.isfinite(w) and most > 0.0:
             exponent = (t - t[0]) * w / (2.0 * np.pi) * math.log10(growth) + math.log10(most)
             keep = exponent < math.log10(LARGEST_DRAWN)
             dashed: dict[str, Any] = {"linestyle": (0, (4, 2)), "linewidth": 1.0}
             lower.plot(t[keep], 10.0 ** exponent[keep], color=colour, **dashed)
         if k == 0 and np.isfinite(exact).any():
-            smooth = exact_curve(experiment, record, quantity, member)
-            upper.plot(*style.thin(*smooth), color="black", linestyle=(0, (1, 2)), zorder=5)
+            smooth = style.thin(*exact_curve(ladder))
+            upper.plot(*smooth, color="black", linestyle=(0, (1, 2)), zorder=5)
     if reference > 0.0:
         upper.set_ylim(-FULLY_DRAWN * reference, FULLY_DRAWN * reference)
     finite = style.finite(*sizes)
     finite = finite if finite.size else np.array([1.0])
     least = 0.2 * (reference or float(np.median(finite)))
     style.log_axis(lower, "y", least, 3.0 * float(finite.max()))
-    upper.set_ylabel(style.label(letter, measure))
-    lower.set_ylabel(style.label(f"|{letter}|", measure))
+    upper.set_ylabel(style.label(ladder.letter, ladder.unit()))
+    lower.set_ylabel(style.label(f"|{ladder.letter}|", ladder.unit()))
     which = "The slowest run" if len(runs) > 1 else "The run"
-    beside = f"{which} beside the {name_of_exact(experiment)} solution (dotted)"
+    beside = f"{which} beside the {record.name_of_exact} solution (dotted)"
     upper.set_title(f"{beside}, up to {FULLY_DRAWN:g} times its size")
     lower.set_title("Size of the solution, and the predicted growth (dashed)")
-    lower.set_xlabel(data.time_label(record))
+    lower.set_xlabel(record.time_label)
     # one legend for both panels
     upper.legend(*lower.get_legend_handles_labels(), **style.BESIDE, fontsize=8, handlelength=1.4)
     return Picture(
@@ -237,17 +232,17 @@ def growing(experiment: Experiment, record: Record) -> Picture | None:
         caption="Runs whose w dt is at or beyond the limit of stability of their scheme; the legend has the factor by "
         "which the amplitude grows in each natural period, measured and by theory. The lines should become parallel "
         "to the dashed ones of theory. How far above or below depends on the start.",
-        alt=f"{words.name(quantity)} of unstable runs against time, linear and logarithmic, with the predicted growth",
+        alt=f"{ladder.name} of unstable runs against time, linear and logarithmic, with the predicted growth",
         figure=upper.get_figure(root=True),
     )
 
 
-def _unstable(record: Record) -> list[tuple[Member, int]]:
+def _unstable(record: Results) -> list[tuple[Member, int]]:
     """Choose the unstable runs, from the slowest growth to the fastest."""
-    growth = optional(record, "theory_growth", OF_LEVEL)
-    limit, product = optional(record, "stability_limit", MEMBER), omega_dt(record)
+    growth = record.optional("theory_growth", OF_LEVEL)
+    limit, product = record.optional("stability_limit", MEMBER), record.omega_dt
     runs: list[tuple[float, Member, int]] = []
-    for member in data.all_members(record):
+    for member in record.all_members:
         most = float(limit[member.scheme, member.case])
         for i, factor in enumerate(growth[member.scheme, member.case].tolist()):
             is_beyond = 0.0 < most <= product[member.case, i] * (1.0 + 1e-9)
@@ -257,12 +252,12 @@ def _unstable(record: Record) -> list[tuple[Member, int]]:
     return [runs[i][1:] for i in style.spaced(len(runs), MOST_RUNS)]
 
 
-def _run_label(record: Record, member: Member, level: int) -> str:
+def _run_label(record: Results, member: Member, level: int) -> str:
     from_theory, measured = (
-        words.number(data.at(record, f"{origin}_growth", member, level=level).item())
+        words.number(record.at(f"{origin}_growth", member, level=level).item())
         for origin in ("theory", "measured")
     )
-    product = words.number(float(omega_dt(record)[member.case, level]), "step")
+    product = words.number(float(record.omega_dt[member.case, level]), "step")
     return style.entry(
         f"{member.scheme_name}, w dt = {product}\n× {measured}, theory {from_theory}"
     )

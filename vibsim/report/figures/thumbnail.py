@@ -13,13 +13,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vibsim.core.array_types import Floats
-from vibsim.core.record import Record
 from vibsim.core.vocabulary import MEMBER
 from vibsim.report import data, finest_level, frame, style, sweep_layout
-from vibsim.report.data import Member
+from vibsim.report.data import Ladder, Member, Results
 from vibsim.report.figures import moments
 from vibsim.report.sweep_layout import Along, Grid
-from vibsim.report.types import Experiment
 
 WIDTH, HEIGHT = 240.0, 96.0
 EDGE = 5.0  # free space around curves
@@ -45,25 +43,25 @@ _ENDS = (68, 1, 84), (33, 145, 140), (253, 231, 37)
 Lines = list[tuple[Floats, Floats]]
 
 
-def thumbnail(experiment: Experiment, record: Record, member: Member) -> str:
+def thumbnail(record: Results, member: Member) -> str:
     """Return the thumbnail as an SVG document; without a response to a sweep it shows the motion of `member`."""
-    layout = sweep_layout.layout_of(experiment, record)
-    model = experiment.model.definition
+    layout, model = sweep_layout.layout_of(record), record.model
     names = sorted(NUMBERS, key="period".__ne__) if model.conservative else NUMBERS
     if isinstance(layout, Along) and (lines := _response(record, layout, names)):
         return document(lines)
     if isinstance(layout, Grid) and (cells := _map(record, layout, names, model.position)):
         return _document("".join(cells), "map")
-    if data.is_lean(record):
-        levels = np.array(data.whole(record, "level"), dtype=np.float64)
-        return document([(levels, np.log10(finest_level.norms(record, model.position, member)))])
-    positions = model.states[: model.coordinates]
-    series = [data.at(record, f"{row.name}_finest", member) for row in positions]
+    if record.is_lean:
+        levels = np.array(record.levels, dtype=np.float64)
+        norms = finest_level.norms(Ladder(record, model.position, member))
+        return document([(levels, np.log10(norms))])
+    ladders = [Ladder(record, row.name, member) for row in model.states[: model.coordinates]]
+    series = [ladder.finest for ladder in ladders]
     reach = [_reach(values) for values in series]
     widest = int(np.argmax(reach))
     if len(series) == 2 and min(reach) > FLAT * reach[widest] and not _is_straight(*series):
         return document([(series[0], series[1])], is_equal=True)
-    return document(_solutions(record, positions[widest].name, member, layout))
+    return document(_solutions(ladders[widest], layout))
 
 
 def _reach(values: Floats) -> float:
@@ -72,22 +70,19 @@ def _reach(values: Floats) -> float:
     return float(np.ptp(finite)) if finite.size else 0.0
 
 
-def _solutions(record: Record, position: str, member: Member, layout: Along | Grid | None) -> Lines:
+def _solutions(ladder: Ladder, layout: Along | Grid | None) -> Lines:
     """Return the finest level of some members along a line, else of each scheme; a single one also on the coarsest."""
-    t = data.times(record, member.case)
-    of = data.of_case(record, member.case)[:CURVES]
+    t, of = ladder.t, ladder.record.of_case(ladder.case)[:CURVES]
     if isinstance(layout, Along):
         cases = layout.lines[0][1]
         shown = cases[style.spaced(cases.size, CURVES)].tolist()
-        of = [Member(member.scheme, case, "") for case in shown]
+        of = [Member(ladder.scheme, case, "") for case in shown]
     of.reverse()
-    if len(of) > 1:
-        series = [data.at(record, f"{position}_finest", one) for one in of]
-    else:
-        levels = [0, len(data.whole(record, "level")) - 1]
-        series = [data.state_at(record, position, member, level) for level in levels]
+    series = [ladder.with_member(one).finest for one in of]
+    if len(of) == 1:
+        series = [ladder.on_level(0), ladder.finest]
     largest = [data.largest(values) for values in series if np.isfinite(values).all()]
-    known = frame.sizes(record, position)
+    known = frame.sizes(ladder.record, ladder.quantity)
     lines = []
     for i, values in enumerate(series):
         size = float(known[of[i % len(of)].case])
@@ -105,13 +100,13 @@ def _is_straight(x: Floats, y: Floats) -> bool:
     return bool(both * both > STRAIGHT * np.sum(across * across) * np.sum(up * up))
 
 
-def _response(record: Record, along: Along, names: Sequence[str]) -> Lines:
+def _response(record: Results, along: Along, names: Sequence[str]) -> Lines:
     """Return a number over the swept key, one curve for each line of members; empty if no number varies."""
     key = along.key
     if key.distinct.size < sweep_layout.FEWEST_VALUES:
         return []
     for name in names:
-        values = np.abs(data.optional(record, name, MEMBER, level=-1)[0])
+        values = np.abs(record.optional(name, MEMBER, level=-1)[0])
         if is_telling(values):
             if data.largest(values) > WIDE * np.median(style.finite(values)):
                 values = np.log10(style.no_zeros(values))
@@ -121,9 +116,9 @@ def _response(record: Record, along: Along, names: Sequence[str]) -> Lines:
     return []
 
 
-def _map(record: Record, grid: Grid, names: Sequence[str], position: str) -> list[str]:
+def _map(record: Results, grid: Grid, names: Sequence[str], position: str) -> list[str]:
     """Return the coloured cells of a map; empty if no number varies."""
-    found = [np.abs(data.optional(record, name, MEMBER, level=-1)[0]) for name in names]
+    found = [np.abs(record.optional(name, MEMBER, level=-1)[0]) for name in names]
     found.append(np.log10(style.no_zeros(finest_level.error(record, position).best[0])))
     values = next((values for values in found if is_telling(values)), None)
     if values is None:

@@ -13,9 +13,8 @@ import numpy as np
 from vibsim.comparison.rescaled_differences import rescaling
 from vibsim.convergence.differences import gap_ratio, target_ratio
 from vibsim.core.array_types import Floats
-from vibsim.core.record import Record
-from vibsim.report import data, frame, style, words
-from vibsim.report.data import Member
+from vibsim.report import frame, style, words
+from vibsim.report.data import Ladder, Member, Results
 from vibsim.report.figures import panels
 from vibsim.report.style import Picture
 from vibsim.report.types import Axes
@@ -28,36 +27,34 @@ ROOM, BEYOND = 0.35, 3.0  # least and most distance from the formal order to the
 SPREAD = "the spread: how far each curve is from the finest one above round-off."
 
 
-def name_of_differences(quantity: str, member: Member) -> str:
+def name_of_differences(ladder: Ladder) -> str:
     """Return the name of the picture of `overlay`."""
-    return f"differences_{quantity}_{member.stem}"
+    return f"differences_{ladder.stem}"
 
 
-def overlay(record: Record, quantity: str, member: Member) -> Picture:
+def overlay(ladder: Ladder) -> Picture:
     """Draw the rescaled level differences of a quantity, their spread, ratio and order over time."""
-    t, order = data.times(record, member.case), data.rescaling_order(record, member, quantity)
-    letter, measure = words.symbol(quantity), data.unit(record, f"{quantity}_difference")
-    levels, sound = data.whole(record, "level"), data.sound_triples(record, quantity, member)
-    curves = differences(record, quantity, member)
-    spread, ratios = panels.comparable(curves), bool(sound)
-    orders = ratios and has_order(record, quantity, member)
+    t, order, levels = ladder.t, ladder.rescaling_order, ladder.record.levels
+    letter, measure, curves = ladder.letter, ladder.unit("difference"), differences(ladder)
+    spread, ratios = panels.comparable(curves), bool(ladder.record.triples)
+    orders = ratios and ladder.has("local_order")
     axes = panels.stacked([2.4, *[1.3] * spread, *[1.5] * ratios, *[1.5] * orders], style.TIME)
     panels.draw_curves(axes[0], t, curves, f"rescaled difference of {letter}", measure)
     axes[0].set_title("Rescaled differences between successive levels")
     if spread:
         panels.draw_spread(axes[1], t, curves, measure)
     if ratios:
-        _draw_ratios(axes[-2 if orders else -1], t, record, quantity, member, sound)
+        _draw_ratios(axes[-2 if orders else -1], ladder)
     if orders:
-        _draw_orders(axes[-1], t, record, quantity, member, sound)
-    axes[-1].set_xlabel(data.time_label(record))
+        _draw_orders(axes[-1], ladder)
+    axes[-1].set_xlabel(ladder.record.time_label)
     law = f"dt{words.superscript(order)}" if order != 1.0 else "dt"
     what = f", {_multiplied(order, levels)}; if the error shrinks as {law}, the curves fall on one another."
-    if math.isinf(data.formal_order(record, member, quantity)):
+    if math.isinf(ladder.formal_order):
         what = ". The scheme is exact in this quantity, so nothing is rescaled and what is seen is round-off."
     return Picture(
-        name=name_of_differences(quantity, member),
-        title=f"Do the levels agree? {words.title(quantity)}, {member.title}",
+        name=name_of_differences(ladder),
+        title=f"Do the levels agree? {words.title(ladder.quantity)}, {ladder.title}",
         caption=style.sentences(
             f"{letter}{words.subscript(levels[0])} is {letter} on level {levels[0]}, and so on. Top: the differences "
             f"between successive levels{what}",
@@ -68,27 +65,25 @@ def overlay(record: Record, quantity: str, member: Member) -> Picture:
             "round-off, or nothing differs. Circle: the last time step, judged separately."
             * orders,
         ),
-        alt=f"Rescaled level differences of {words.name(quantity)} against time for {member.title}"
+        alt=f"Rescaled level differences of {ladder.name} against time for {ladder.title}"
         + ", with the ratio of successive differences" * ratios
         + " and the order over time" * orders,
         figure=axes[0].get_figure(root=True),
     )
 
 
-def energy(record: Record, member: Member) -> Picture:
+def energy(record: Results, member: Member) -> Picture:
     """Draw the energy deviation of every level times ``(2**p)**k``: convergence to conservation."""
-    name, levels = "energy_deviation", data.whole(record, "level")
-    order = data.rescaling_order(record, member, name)
-    measure, t = data.unit(record, f"{name}_scaled"), data.times(record, member.case)
-    above = data.sound_pairs(record, name, member) if len(levels) > 1 else [True]
+    ladder, levels = Ladder(record, "energy_deviation", member), record.levels
+    order, measure, t = ladder.rescaling_order, ladder.unit("scaled"), ladder.t
+    above = ladder.sound_pairs if len(levels) > 1 else [True]
     # the finest level is as sound as its difference from the next coarser one
     above = [*above, above[-1]][: len(levels)]
     curves = []
     for i in _few(above):
-        values = data.at(record, f"{name}_scaled", member, level=i)
+        values, lost = ladder.at("scaled", level=i), _lost(ladder, [i])
         factor = words.factor(float(gap_ratio(order, levels[i] - levels[0])), 2.0**order)
         text = f"{factor}ΔE{words.subscript(levels[i])}"
-        lost = _lost(record, name, member, [i])
         curves.append(panels.Curve(text, values, above[i], lost, style.of_level(levels[i])))
     spread = panels.comparable(curves)
     axes = panels.stacked([2.4, *[1.3] * spread], style.TIME)
@@ -96,7 +91,7 @@ def energy(record: Record, member: Member) -> Picture:
     axes[0].set_title("Energy deviation ΔE = E(t) − E(0), rescaled")
     if spread:
         panels.draw_spread(axes[1], t, curves, measure)
-    axes[-1].set_xlabel(data.time_label(record))
+    axes[-1].set_xlabel(record.time_label)
     return Picture(
         name=f"conservation_{member.stem}",
         title=f"Convergence to conservation: {member.title}",
@@ -104,7 +99,7 @@ def energy(record: Record, member: Member) -> Picture:
             f"ΔE{words.subscript(levels[0])} is ΔE on level {levels[0]}, and so on. The exact energy is constant, so "
             "ΔE itself is an error.",
             "The scheme conserves the energy exactly: what is seen is round-off."
-            if math.isinf(data.formal_order(record, member, name))
+            if math.isinf(ladder.formal_order)
             else f"Multiplied by {2.0**order:g} for each level the curves should coincide; look at the last point "
             "too, where the velocity comes from a formula of its own.",
             f"Below, {SPREAD}" if spread else "",
@@ -114,29 +109,29 @@ def energy(record: Record, member: Member) -> Picture:
     )
 
 
-def differences(record: Record, quantity: str, member: Member) -> list[panels.Curve]:
+def differences(ladder: Ladder) -> list[panels.Curve]:
     """Return the level differences, rescaled so that errors ``C dt**p`` make them coincide; at most `MOST_CURVES`."""
-    order, levels = data.rescaling_order(record, member, quantity), data.whole(record, "level")
-    above, letter = data.sound_pairs(record, quantity, member), words.symbol(quantity)
+    order, levels = ladder.rescaling_order, ladder.record.levels
+    above, letter = ladder.sound_pairs, ladder.letter
     curves = []
     for i in _few(above):
         gap = f"{letter}{words.subscript(levels[i])} − {letter}{words.subscript(levels[i + 1])}"
         factor = words.factor(float(rescaling(order, levels[: i + 2])), 2.0**order)
-        values = data.at(record, f"{quantity}_rescaled", member, pair=i)
-        lost = _lost(record, quantity, member, [i, i + 1])
+        values = ladder.at("rescaled", pair=i)
+        lost = _lost(ladder, [i, i + 1])
         text = f"{factor}({gap})" if factor else gap
         curves.append(panels.Curve(text, values, above[i], lost, style.of_level(levels[i])))
     return curves
 
 
-def _lost(record: Record, quantity: str, member: Member, levels: list[int]) -> str:
+def _lost(ladder: Ladder, levels: list[int]) -> str:
     """Say why values that come from `levels` (positions) would mean nothing (see `frame.why_lost`)."""
     values = np.zeros(1)
-    if f"{quantity}_scaled" in record and len(levels) == 1:
-        values = data.at(record, f"{quantity}_scaled", member, level=levels[0])
-    elif levels[0] < len(data.whole(record, "pair")):
-        values = data.at(record, f"{quantity}_difference", member, pair=levels[0])
-    return frame.why_lost(record, quantity, member, levels, values)
+    if "scaled" in ladder and len(levels) == 1:
+        values = ladder.at("scaled", level=levels[0])
+    elif levels[0] < len(ladder.record.pairs):
+        values = ladder.at("difference", pair=levels[0])
+    return frame.why_lost(ladder, levels, values)
 
 
 def _multiplied(order: float, levels: list[int]) -> str:
@@ -161,14 +156,12 @@ def _few(sound: list[bool]) -> list[int]:
     return [*shown, *lost]
 
 
-def _draw_ratios(
-    ax: Axes, t: Floats, record: Record, quantity: str, member: Member, sound: list[bool]
-) -> None:
-    levels, order = data.whole(record, "level"), data.rescaling_order(record, member, quantity)
+def _draw_ratios(ax: Axes, ladder: Ladder) -> None:
+    levels, order, sound = ladder.record.levels, ladder.rescaling_order, ladder.sound_triples
     drawn: list[Floats] = []
-    lost = [_lost(record, quantity, member, [i, i + 1, i + 2]) for i in range(len(sound))]
+    lost = [_lost(ladder, [i, i + 1, i + 2]) for i in range(len(sound))]
     for k, i in enumerate(_few(sound)):
-        values = data.at(record, f"{quantity}_ratio", member, triple=i)
+        values = ladder.at("ratio", triple=i)
         if not np.isfinite(values).any():
             continue
         look: dict[str, Any] = {"color": style.PALE, "linewidth": 0.6, "zorder": 1.5}
@@ -176,14 +169,13 @@ def _draw_ratios(
             look = {"color": style.COLOURS[k], "linestyle": style.DASHES[k], "linewidth": 1.3}
             drawn.append(values)
         text = _triple(levels, i) + ("" if sound[i] else f"\n({lost[i]})")
-        style.curve(ax, t, values, label=text, gid=style.of_level(levels[i]), **look)
+        style.curve(ax, ladder.t, values, label=text, gid=style.of_level(levels[i]), **look)
     if not drawn:
         style.remark(ax, _why_no_ratio(sound, lost))
     targets = sorted({float(target_ratio(order, levels[i : i + 3])) for i in _few(sound)})
     # a line would cross out the remark
     for k, target in enumerate(targets if drawn else []):
-        text = "" if k else data.basis_of_order(record, quantity)
-        ax.axhline(target, **style.REFERENCE, label=text)
+        ax.axhline(target, **style.REFERENCE, label="" if k else ladder.basis_of_order)
     # the frame holds the targets and the middle 90 % of the ratios, without wild outliers
     ratios = style.finite(*drawn)
     ratios = ratios if ratios.size else np.array(targets)
@@ -209,31 +201,23 @@ def _why_no_ratio(sound: list[bool], lost: list[str]) -> str:
     return "nothing to divide: every difference is within round-off, or zero"
 
 
-def has_order(record: Record, quantity: str, member: Member) -> bool:
-    """Return whether the record has an order over time."""
-    name = f"{quantity}_local_order"
-    return name in record and bool(np.isfinite(data.at(record, name, member)).any())
-
-
 def finest_sound(sound: list[bool]) -> list[int]:
     """Choose triples: the finest ones above round-off, else the coarsest."""
     return [i for i, is_sound in enumerate(sound) if is_sound][-ORDERS:] or [0]
 
 
-def _draw_orders(
-    ax: Axes, t: Floats, record: Record, quantity: str, member: Member, sound: list[bool]
-) -> None:
+def _draw_orders(ax: Axes, ladder: Ladder) -> None:
     """Draw the order over time of the finest triples with their intervals, and the formal order.
 
     A triple has the colour of its ratio. The last point is drawn separately; uncertain orders are grey dots.
     """
-    levels, promised = data.whole(record, "level"), data.formal_order(record, member, quantity)
+    t, levels, promised = ladder.t, ladder.record.levels, ladder.formal_order
+    sound = ladder.sound_triples
     colours = _few(sound)
     drawn: list[Floats] = []
     for i in finest_sound(sound):
         order, low, high = (
-            data.at(record, f"{quantity}_local_order{end}", member, triple=i)
-            for end in ("", "_low", "_high")
+            ladder.at(f"local_order{end}", triple=i) for end in ("", "_low", "_high")
         )
         if not np.isfinite(order).any():
             continue
@@ -259,7 +243,7 @@ def _draw_orders(
     orders = style.finite(*drawn)
     ends = np.array([orders.min(), orders.max()] if orders.size else [])
     if math.isfinite(promised):
-        ax.axhline(promised, **style.REFERENCE, label=data.basis_of_order(record, quantity))
+        ax.axhline(promised, **style.REFERENCE, label=ladder.basis_of_order)
         low_end = max(float(min([promised - ROOM, *(ends - 0.1)])), promised - BEYOND)
         ax.set_ylim(low_end, min(float(max([promised + ROOM, *(ends + 0.1)])), promised + BEYOND))
     else:

@@ -14,12 +14,12 @@ from typing import Any
 import numpy as np
 
 from vibsim.core.array_types import Floats
-from vibsim.core.record import Record
+from vibsim.models import Model
 from vibsim.report import data, style, words
+from vibsim.report.data import Results
 from vibsim.report.figures import moments, scenes
 from vibsim.report.figures.scenes import Scene
-from vibsim.report.series import name_of_exact, parameters_of
-from vibsim.report.types import Experiment
+from vibsim.report.series import parameters_of
 
 MOST_FRAMES = 1500
 """Longer runs have fewer frames a period, and then show only their beginning, unless the user sets the number."""
@@ -72,22 +72,22 @@ class Film:
         return self.stop < self.end
 
 
-def run(experiment: Experiment, record: Record, scheme: str, quantity: str) -> Run:
+def run(record: Results, scheme: str, quantity: str) -> Run:
     """Return a run from a level record that holds one member with its series over time."""
-    model, place = experiment.model.definition, record.words("scheme").index(scheme)
-    t = data.times(record, 0)
+    model, place = record.model, record.schemes.index(scheme)
+    t = record.times(0)
     names = [state.name for state in model.states]
     exact = f"{quantity}_exact"
     step = words.number(float(t[-1]) / int(str(record.attrs["steps"])), "brief")
-    prefix = scheme if len(record["scheme"]) > 1 else ""
-    text = f"level {int(record['level'])}, dt = {step} {data.time_unit(record)}".strip()
+    prefix = scheme if len(record.schemes) > 1 else ""
+    text = f"level {int(record['level'])}, dt = {step} {record.time_unit}".strip()
     return Run(
-        title=", ".join(filter(None, [prefix, text, words.swept(data.case_name(record, 0))])),
+        title=", ".join(filter(None, [prefix, text, words.swept(record.case_name(0))])),
         t=t,
         series=np.asarray(record[quantity][place, 0], dtype=np.float64),
         states={name: record[name][place, 0] for name in names if name in record},
         exact=np.asarray(record[exact][0], dtype=np.float64) if exact in record else None,
-        parameters=parameters_of(experiment, record, 0),
+        parameters=parameters_of(record, 0),
     )
 
 
@@ -102,8 +102,7 @@ def differs_visibly(other: Run, first: Run) -> float:
 
 
 def film(
-    experiment: Experiment,
-    record: Record,
+    record: Results,
     runs: Sequence[Run],
     quantity: str,
     *,
@@ -140,15 +139,15 @@ def film(
     window = moments.window(span, period) if periods is None else min(span, periods * period)
     return Film(
         runs=tuple(runs),
-        scenes=_scenes(experiment, runs, t),
+        scenes=_scenes(record.model, runs, t),
         t=t,
         start=begin,
         stop=stop,
         window=window,
-        label=style.label(words.symbol(quantity), data.unit(record, quantity)),
-        time_unit=data.time_unit(record),
+        label=style.label(words.symbol(quantity), record.unit(quantity)),
+        time_unit=record.time_unit,
         end=last,
-        name_of_exact=name_of_exact(experiment),
+        name_of_exact=record.name_of_exact,
     )
 
 
@@ -160,8 +159,7 @@ def _as_needed(start: float, end: float, period: float, fps: float, most: int) -
     return frames, min(end, start + period * frames / FEWEST_FRAMES_A_PERIOD)
 
 
-def _scenes(experiment: Experiment, runs: Sequence[Run], t: Floats) -> tuple[Scene, ...]:
-    model = experiment.model.definition
+def _scenes(model: Model, runs: Sequence[Run], t: Floats) -> tuple[Scene, ...]:
     draw = scenes.scene_of(model)
     series = [x for one in runs for x in one.states.values()]
     is_whole = all(len(one.states) == len(model.states) for one in runs)

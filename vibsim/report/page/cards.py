@@ -6,22 +6,20 @@ import math
 from collections.abc import Iterator, Mapping
 from typing import Any
 
-from vibsim.checks.number_units import unit_of
 from vibsim.checks.outcome import Result
 from vibsim.checks.value import is_proved
 from vibsim.checks.verdict_text import Wording
 from vibsim.core.home import called
-from vibsim.core.record import Record
 from vibsim.core.vocabulary import worst
 from vibsim.plan.versions import DRAWING, versions
-from vibsim.report import data, words
-from vibsim.report.choice import is_refutation, is_trap
+from vibsim.report import choice, words
+from vibsim.report.choice import CheckedLadder
+from vibsim.report.data import Results
 from vibsim.report.evidence import figure
 from vibsim.report.tables import checks as check_tables
 from vibsim.report.tables import published
 from vibsim.report.tables.table import Column, Table
 from vibsim.report.text import assertions, experiment_file, findings, reasons
-from vibsim.report.types import Check, Experiment
 
 SAID_BY_THE_LINE = ("value", "equal", "converges")
 """Kinds of checks whose line says everything if they pass."""
@@ -29,13 +27,11 @@ ALIKE = 6  # value checks, or checks of equality, from which their lines become 
 WIDE = 1.0  # an interval that extends further below its order gets a sentence
 
 
-def cards(
-    experiment: Experiment, record: Record, summary: Mapping[str, Any]
-) -> list[dict[str, Any]]:
+def cards(record: Results, summary: Mapping[str, Any]) -> list[dict[str, Any]]:
     """Return the cards of all checks; of checks of printed numbers only those that did not pass."""
-    in_tables = published.ids(experiment)
+    in_tables = published.ids(record.experiment)
     return [
-        card(experiment, record, check)
+        card(record, check)
         for check in summary["checks"]
         if check["id"] not in in_tables or check["status"] != "PASS"
     ]
@@ -67,42 +63,35 @@ def gathered(
     return made, groups
 
 
-def card(experiment: Experiment, record: Record, check: Mapping[str, Any]) -> dict[str, Any]:
+def card(record: Results, check: Mapping[str, Any]) -> dict[str, Any]:
     """Return the card of a check; the check of a tolerance has no assertion in the experiment."""
-    asserted = next((spec for spec in experiment.checks if spec.id == check["id"]), None)
-    measured = asserted.measured if asserted else None
-    kind = measured.kind if measured else check["kind"]
-    value = measured if measured and measured.kind == "value" else None
-    explained = reasons.reason(
-        check["reason"],
-        kind,
-        value=value.value if value else "",
-        levels=len(data.whole(record, "level")),
-        is_promised=findings.keeps_promise(record, measured, check),
-    )
+    checked = choice.of_check(record, check)
+    asserted, measured, decisive = checked.asserted, checked.measured, checked.result
+    explained = findings.explained(checked, checked.reason)
     # the reason alone does not say that a claim is refuted as expected
-    is_refuted = is_refutation(asserted) and check["reason"] == "match"
-    unit = data.pretty_unit(unit_of(experiment, record, value)) if value else ""
-    wording = Wording(experiment, record, asserted, words.PAGE)
-    decisive, counts, status = check["results"][0], check["counts"], check["status"]
+    is_refuted = checked.is_refutation and checked.reason == "match"
+    value = measured if measured and measured.kind == "value" else None
+    unit = record.unit_of_number(value) if value else ""
+    wording = Wording(record.experiment, record, asserted, words.PAGE)
+    counts, status = check["counts"], checked.status
     result = Result.of(decisive)
     decides = worst(word for word, count in counts.items() if count)
     text = words.swept(wording.text(result, counts, check["where"]))
-    if _is_said(asserted, check):
-        text = _hardest(record, check)
-    wanted = assertions.wanted(experiment, measured, words.fact(decisive, "promised"), unit)
+    if _is_said(checked):
+        text = _hardest(checked)
+    wanted = assertions.wanted(record.experiment, measured, words.fact(decisive, "promised"), unit)
     results, more = _results(record, check, unit)
     return {
         "id": check["id"],
         "status": status,
-        "measures": kind,
+        "measures": checked.kind,
         "badge": words.badge(check),
         "what": assertions.about(asserted, record),
         "source": assertions.source(asserted, record),
-        "wanted": f"false (the statement: {wanted})" if is_refutation(asserted) else wanted,
-        "got": words.swept(_got(check, wording, result)) + _of_all(check),
+        "wanted": f"false (the statement: {wanted})" if checked.is_refutation else wanted,
+        "got": words.swept(_got(checked, wording, result)) + _of_all(check),
         "note": getattr(asserted, "note", None) or "",
-        "reason": check["reason"] or "–",
+        "reason": checked.reason or "–",
         "meaning": reasons.REFUTED if is_refuted else explained.meaning,
         "needs": explained.needs,
         "results": results,
@@ -114,60 +103,50 @@ def card(experiment: Experiment, record: Record, check: Mapping[str, Any]) -> di
             if word != decides
         ],
         "alone": _alone(check),
-        "picture": figure.picture(experiment, record, asserted, check),
+        "picture": figure.picture(checked),
         "text": text,
         "advice": wording.advice(status, result, counts),
-        "change": experiment_file.change(experiment, measured, check),
+        "change": experiment_file.change(record.experiment, measured, check),
     }
 
 
-def _is_said(asserted: Check | None, check: Mapping[str, Any]) -> bool:
+def _is_said(checked: CheckedLadder) -> bool:
     """Return whether the line of a check says everything: it passed beyond doubt."""
-    if check["status"] != "PASS" or asserted is None:
+    check, fact = checked.measured, checked.facts.get
+    if checked.status != "PASS" or check is None or _is_beside(checked):
         return False
-    result = check["results"][0]
-    order, low = (words.fact(result, name) for name in ("order", "order_low"))
-    is_doubtful = order is not None and low is not None and order - low > WIDE
-    is_doubtful |= _is_beside(asserted, check)
-    if asserted.measured.kind == "value":
-        number, bound = (words.fact(result, name) for name in ("value", "error_bound"))
-        is_doubtful |= None not in (number, bound) and not is_proved(
-            asserted.measured, number, bound
-        )
-    is_plain = asserted.measured.kind in SAID_BY_THE_LINE and not is_trap(asserted)
-    return is_plain and not is_doubtful
+    order, low, number, bound = map(fact, ("order", "order_low", "value", "error_bound"))
+    if order is not None and low is not None and order - low > WIDE:
+        return False
+    if check.kind == "value" and number is not None and bound is not None:
+        return is_proved(check, number, bound) and not checked.is_trap
+    return check.kind in SAID_BY_THE_LINE and not checked.is_trap
 
 
-def _is_beside(asserted: Check | None, check: Mapping[str, Any]) -> bool:
+def _is_beside(checked: CheckedLadder) -> bool:
     """Return whether a check passed whose order misses the expected one, because its interval reaches that."""
-    order, wanted = (words.fact(check["results"][0], name) for name in ("order", "promised"))
-    if asserted is None or check["status"] != "PASS" or None in (order, wanted):
+    order, wanted = (checked.facts.get(name) for name in ("order", "promised"))
+    if checked.status != "PASS" or order is None or wanted is None or checked.is_trap:
         return False
-    return abs(order - wanted) > getattr(asserted.measured, "tolerance", math.inf) and not is_trap(
-        asserted
-    )
+    return bool(abs(order - wanted) > getattr(checked.measured, "tolerance", math.inf))
 
 
-def _hardest(record: Record, check: Mapping[str, Any]) -> str:
+def _hardest(checked: CheckedLadder) -> str:
     """Name the decisive one of several results; empty for a single result."""
-    total, result = sum(check["counts"].values()), check["results"][0]
-    if total < 2:
+    if checked.total < 2:
         return ""
-    named = check_tables.member(record, result["case"])
-    place = f"{result['scheme']}{f', {named}' if named else ''}"
-    return f"The hardest of {words.number(total, 'integer')}: {place}."
+    named = check_tables.member(checked.record, checked.result["case"])
+    place = f"{checked.result['scheme']}{f', {named}' if named else ''}"
+    return f"The hardest of {words.number(checked.total, 'integer')}: {place}."
 
 
-def _got(check: Mapping[str, Any], wording: Wording, result: Result) -> str:
+def _got(checked: CheckedLadder, wording: Wording, result: Result) -> str:
     """Say in a few words what the decisive result measured."""
-    decisive = check["results"][0]
-    if words.fact(decisive, "order") is not None and result.status != "INCONCLUSIVE":
-        order, bounds = words.fact(decisive, "order"), words.interval_of(decisive)
-        text = f"order {words.with_interval(order, bounds)}"
-        return (
-            f"{text}: its interval overlaps the band" if _is_beside(wording.check, check) else text
-        )
-    if check["kind"] == "converges" or "order" in decisive["facts"]:
+    order = checked.facts.get("order")
+    if order is not None and result.status != "INCONCLUSIVE":
+        text = f"order {words.with_interval(order, words.interval_of(checked.result))}"
+        return f"{text}: its interval overlaps the band" if _is_beside(checked) else text
+    if checked.is_on_order or "order" in checked.facts:
         return reasons.OUTCOMES.get(result.reason, str(result.reason))
     return wording.brief(result)
 
@@ -183,7 +162,7 @@ def _of_all(check: Mapping[str, Any]) -> str:
     return f"; {count} of {total} {words.BADGES[status]}"
 
 
-def _results(record: Record, check: Mapping[str, Any], unit: str) -> tuple[Any, str]:
+def _results(record: Results, check: Mapping[str, Any], unit: str) -> tuple[Any, str]:
     """Return the table of results and a sentence on those left out; neither for one result or a passed check."""
     table, counts = check_tables.results(record, check, unit), check["counts"]
     total = sum(counts.values())

@@ -15,9 +15,9 @@ from numpy.typing import NDArray
 
 from vibsim.core.array_types import Floats
 from vibsim.core.home import called
-from vibsim.core.record import Record
 from vibsim.core.set_option import set_options
-from vibsim.report import data, style, sweep_layout, words
+from vibsim.report import style, sweep_layout, words
+from vibsim.report.data import Results
 from vibsim.report.figures.sweeps.view import View
 from vibsim.report.sweep_layout import Key
 from vibsim.report.types import Experiment
@@ -26,19 +26,17 @@ POINTS = 2000
 """Most points of a view that respond to the pointer."""
 
 
-def worst(
-    experiment: Experiment, record: Record, views: Sequence[View]
-) -> list[tuple[str, str, str]]:
+def worst(record: Results, views: Sequence[View]) -> list[tuple[str, str, str]]:
     """Return the marked members: the letters of the quantities, the name of the member, and its command."""
     found: dict[int, dict[str, None]] = {}
     for view in views:
         if view.worst is not None:
             found.setdefault(view.worst, {})[words.symbol(view.quantity)] = None
-    start, end = _around(experiment)
+    start, end = _around(record.experiment)
     rows = []
     for case, letters in found.items():
         command = f"{start}{int(record['case'][case])}{end}"
-        rows.append((", ".join(letters), words.swept(data.case_name(record, case)), command))
+        rows.append((", ".join(letters), words.swept(record.case_name(case)), command))
     return rows
 
 
@@ -51,24 +49,24 @@ def _around(experiment: Experiment) -> tuple[str, str]:
     return called(f"vibsim run {start}"), end + set_options(experiment.settings)
 
 
-def content(experiment: Experiment, record: Record, views: Sequence[View]) -> dict[str, Any] | None:
+def content(record: Results, views: Sequence[View]) -> dict[str, Any] | None:
     """Return the data for the script of a page; None without a view."""
     if not views:
         return None
     keys = sweep_layout.keys(record)
     most = POINTS // max(len(view.schemes) for view in views)
     marked = [view.worst for view in views if view.worst is not None]
-    cases = listed(keys, len(record["case"]), most, marked)
+    cases = listed(keys, record.count, most, marked)
     quantities = dict.fromkeys(view.quantity for view in views)
     return {
-        "command": _around(experiment),
-        "count": len(record["case"]),
+        "command": _around(record.experiment),
+        "count": record.count,
         "cases": record["case"][cases].tolist(),
         "keys": [
             {"name": key.key, "unit": key.unit, "words": key.words, "values": _numbers(key.values[cases], 6)}
             for key in keys
         ],
-        "schemes": record.words("scheme"),
+        "schemes": record.schemes,
         "verdicts": {name: found for name in quantities if (found := _verdicts(record, name, cases))},
         "views": {view.picture.name: _view(view, cases) for view in views},
     }  # fmt: skip
@@ -105,13 +103,11 @@ def _view(view: View, cases: NDArray[np.intp]) -> dict[str, Any]:
     }  # fmt: skip
 
 
-def _verdicts(record: Record, quantity: str, cases: NDArray[np.intp]) -> dict[str, Any] | None:
+def _verdicts(record: Results, quantity: str, cases: NDArray[np.intp]) -> dict[str, Any] | None:
     """Return the texts of the verdicts on a quantity, and their indices by scheme and member."""
     if f"{quantity}_status" not in record:
         return None
-    status, reason = (
-        data.flags(record, f"{quantity}_{of}")[:, cases] for of in ("status", "reason")
-    )
+    status, reason = (record.flags(f"{quantity}_{of}")[:, cases] for of in ("status", "reason"))
     texts, place = np.unique((status + " (" + reason + ")").astype(str), return_inverse=True)
     on = words.symbol(quantity)
     return {"on": on, "texts": texts.tolist(), "of": place.reshape(status.shape).tolist()}

@@ -14,8 +14,9 @@ from vibsim.core.record import Record
 from vibsim.core.set_option import command_to_run
 from vibsim.core.vocabulary import FIGURE_FORMATS
 from vibsim.experiment.collection import ADHOC, ENDINGS
-from vibsim.report import choice, data, style
-from vibsim.report.choice import Lead
+from vibsim.report import choice, style
+from vibsim.report.choice import CheckedLadder
+from vibsim.report.data import Results
 from vibsim.report.figures import of_source
 from vibsim.report.page import cards, hero, page_figures, page_tables, player
 from vibsim.report.page.templates import environment, markup, sealed
@@ -67,26 +68,26 @@ def write(
     unknown = [form for form in formats if form not in FIGURE_FORMATS]
     if unknown:
         raise VibsimError(f"figure format '{unknown[0]}': {nearest(unknown[0], FIGURE_FORMATS)}")
-    experiment = plan.experiment
-    lead = choice.find_lead(experiment, convergence, summary)
-    files, sources, figures = page_figures.draw(experiment, convergence, lead, formats)
+    record = Results.of(plan.experiment, convergence)
+    lead = choice.find_lead(record, summary)
+    files, sources, figures = page_figures.draw(lead, formats)
     replace_files(directory / "figures", files)
-    texts, tables = page_tables.collect(experiment, convergence, summary, lead, sources)
-    _write_tables(directory / "tables", texts, experiment, convergence)
-    played = player.element(experiment, convergence)
+    texts, tables = page_tables.collect(summary, lead, sources)
+    _write_tables(directory / "tables", texts, record)
+    played = player.element(record)
     page = environment().get_template("report.html").render(
-        hero.context(experiment, convergence, summary, lead)
+        hero.context(summary, lead)
         | figures
         | tables
-        | _checks(experiment, convergence, summary, lead, has_picture="hero_evidence.svg" in files)
-        | _setup(experiment, convergence)
+        | _checks(summary, lead, has_picture="hero_evidence.svg" in files)
+        | _setup(record)
         | {
-            "collection": experiment.collection,
-            "name": experiment.name,
-            "title": experiment.title,
+            "collection": plan.experiment.collection,
+            "name": plan.experiment.name,
+            "title": plan.experiment.title,
             "status": summary["status"],
             "undrawn": of_source.undrawn(sources, has_player=bool(played)),
-            "player_source": of_source.of_player(experiment),
+            "player_source": of_source.of_player(plan.experiment),
             "player": markup(played),
             "provenance": list(cards.provenance_rows(provenance)),
         }
@@ -94,28 +95,21 @@ def write(
     store.write_text(directory / "report.html", sealed(page))
 
 
-def _write_tables(
-    directory: Path, texts: Mapping[str, Mapping[str, str]], experiment: Experiment, record: Record
-) -> None:
+def _write_tables(directory: Path, texts: Mapping[str, Mapping[str, str]], record: Results) -> None:
     """Write the files of tables; the file of members always holds all members of a sweep."""
     files, streamed = page_tables.files_of(texts), list[str]()
-    if data.swept(record):
+    if record.swept:
         streamed = ["members.csv"]
-        members.write_csv(directory / streamed[0], record, choice.position(experiment))
+        members.write_csv(directory / streamed[0], record)
         files.pop(streamed[0], None)
     replace_files(directory, files, streamed)
 
 
 def _checks(
-    experiment: Experiment,
-    record: Record,
-    summary: Mapping[str, Any],
-    lead: Lead,
-    *,
-    has_picture: bool,
+    summary: Mapping[str, Any], lead: CheckedLadder, *, has_picture: bool
 ) -> dict[str, Any]:
     """Return the section of checks; with `has_picture`, the first screen has the picture of the decisive check."""
-    made = cards.cards(experiment, record, summary)
+    made = cards.cards(lead.record, summary)
     decides = lead.entry["id"] if lead.entry else None
     if has_picture:
         made = [card | {"picture": None} if card["id"] == decides else card for card in made]
@@ -137,11 +131,12 @@ def _reading_of_checks(made: Iterable[Mapping[str, Any]]) -> list[tuple[str, str
     return list(found.items())
 
 
-def _setup(experiment: Experiment, record: Record) -> dict[str, Any]:
+def _setup(record: Results) -> dict[str, Any]:
     """Return the section on the setup of the run and how to reproduce it."""
+    experiment = record.experiment
     return {
-        "equation": equation.mathml(experiment.model.definition.equation),
-        "setup": list(setting.setup(experiment, record)),
+        "equation": equation.mathml(record.model.equation),
+        "setup": list(setting.setup(record)),
         "experiment_file": experiment_file.text(experiment),
         "experiment_shown": experiment_file.shown(experiment),
         "command": called(command_to_run(experiment.word, experiment.settings)),

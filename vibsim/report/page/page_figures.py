@@ -7,14 +7,12 @@ from collections.abc import Iterable, Sequence
 from dataclasses import replace
 from typing import Any
 
-from vibsim.core.record import Record
 from vibsim.experiment.schema.figures import FigureOfSource
-from vibsim.report.choice import Lead
+from vibsim.report.choice import CheckedLadder
 from vibsim.report.figures import drawing, gallery, of_source, thumbnail
 from vibsim.report.page import explorer, hero
 from vibsim.report.page.templates import markup
 from vibsim.report.style import Picture
-from vibsim.report.types import Experiment
 
 BYTES = 1_000_000  # most bytes of all figures under tabs; further figures are files only
 FIGURES = 6  # most figures under the tabs of a section
@@ -26,36 +24,37 @@ Sources = list[tuple[FigureOfSource, list[Picture]]]
 
 
 def draw(
-    experiment: Experiment, record: Record, lead: Lead, formats: Sequence[str]
+    lead: CheckedLadder, formats: Sequence[str]
 ) -> tuple[dict[str, bytes], Sources, dict[str, Any]]:
     """Draw the figures of a page from its first screen down, none of them twice.
 
     Return their files, the figures of the source, and the content of the page by the names that its template uses.
     """
+    record = lead.record
     drawn = _Drawn(formats)
-    sources = of_source.pictures(experiment, record, lead)
+    sources = of_source.pictures(lead)
     groups = {
-        "hero": [drawn.add(picture) for picture in hero.pictures(experiment, record, lead)],
+        "hero": [drawn.add(picture) for picture in hero.pictures(lead)],
         "source": [drawn.add(picture) for _, pictures in sources for picture in pictures],
     }
     above = [picture.name for group in groups.values() for picture, _ in group]
-    shown, left_out = gallery.choose(experiment, record, lead.member)
-    below = gallery.pictures(experiment, record, shown, lead, above)
+    shown, left_out = gallery.choose(record, lead.member)
+    below = gallery.pictures(shown, lead, above)
     groups["motion"] = [drawn.add(picture) for picture in below.motion]
     belief = drawn.fitting(below.belief, FIGURES)
     named = {view.picture.name: view for view in below.members}
     single = drawn.fitting((view.picture.title, [view.picture]) for view in below.members)
     over_members = [(named[picture.name], text) for _, [(picture, text)] in single]
     views = [view for view, _ in over_members]
-    small = thumbnail.thumbnail(experiment, record, shown[0])
+    small = thumbnail.thumbnail(record, shown[0])
     content = {
         "figures": groups | {"belief": belief, "members": over_members},
         "reading": {name: _captions(group) for name, group in groups.items()}
         | {"source": _readings(picture for picture, _ in groups["source"])}
         | {"belief": _captions(one for _, group in belief for one in group)}
         | {"members": _readings(view.picture for view in views)},
-        "members": explorer.content(experiment, record, views),
-        "worst": explorer.worst(experiment, record, views),
+        "members": explorer.content(record, views),
+        "worst": explorer.worst(record, views),
         "shared": below.shared,
         "shown": left_out,
         "more_figures": ", ".join(drawn.left_out),

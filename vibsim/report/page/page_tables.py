@@ -3,17 +3,15 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping
 from dataclasses import replace
 from typing import Any
 
-from vibsim.core.record import Record
 from vibsim.core.vocabulary import TYPICAL_NORM
-from vibsim.experiment.schema.figures import FigureOfSource
-from vibsim.report import choice, data, words
-from vibsim.report.choice import Lead
+from vibsim.report import choice, words
+from vibsim.report.choice import CheckedLadder
 from vibsim.report.figures import work
-from vibsim.report.style import Picture
+from vibsim.report.page.page_figures import Sources
 from vibsim.report.tables import (
     best,
     checks,
@@ -27,7 +25,6 @@ from vibsim.report.tables import (
 from vibsim.report.tables.latex import to_latex
 from vibsim.report.tables.scales import table as scales_table
 from vibsim.report.tables.table import Table, to_csv
-from vibsim.report.types import Experiment
 
 MOST_ROWS = 8  # of a table in the page; the CSV file holds all
 ROOM = 220  # most cells of all tables of numbers in the page; further tables are files only
@@ -37,20 +34,17 @@ LONG_HEADING = 90  # most characters of a heading; longer captions are shortened
 
 
 def collect(
-    experiment: Experiment,
-    record: Record,
-    summary: Mapping[str, Any],
-    lead: Lead,
-    sources: Iterable[tuple[FigureOfSource, Sequence[Picture]]],
+    summary: Mapping[str, Any], lead: CheckedLadder, sources: Sources
 ) -> tuple[dict[str, dict[str, str]], dict[str, Any]]:
     """Return the texts of all tables, and the content of the page by the names that its template uses.
 
     The quantity of `lead` comes first; `sources` are the figures of the source with their pictures.
     """
-    everyone = members.table(record, choice.position(experiment))
-    listed, others = _of_numbers(experiment, record, everyone, lead)
-    printed = published.tables(experiment, record, summary)
-    scales = scales_table(experiment, record)
+    record = lead.record
+    everyone = members.table(record)
+    listed, others = _of_numbers(everyone, lead)
+    printed = published.tables(record, summary)
+    scales = scales_table(record)
     broken = checks.failures(summary, record)
     every = [*printed, *listed, *others, scales, checks.checks(summary), broken]
     every += [source_figures.table(sources), everyone]
@@ -72,28 +66,26 @@ def collect(
     }  # fmt: skip
 
 
-def _of_numbers(
-    experiment: Experiment, record: Record, everyone: Table | None, lead: Lead
-) -> tuple[list[Table], list[Table]]:
+def _of_numbers(everyone: Table | None, lead: CheckedLadder) -> tuple[list[Table], list[Table]]:
     """Return the tables of numbers that the page has room for, and those that are files only.
 
     The tables of the quantity and of the member of `lead` come first.
     """
-    model = experiment.model.definition
-    found = sorted(
-        choice.quantities(experiment, record), key=lambda quantity: quantity != lead.quantity
-    )
-    members_of = choice.members(record, choice.first(experiment, record), lead.member)
-    shown = choice.with_levels(experiment, members_of)
+    record = lead.record
+    model = record.model
+    found = sorted(choice.quantities(record), key=lambda quantity: quantity != lead.quantity)
+    members_of = choice.members(record, choice.first(record), lead.member)
+    shown = choice.with_levels(record, members_of)
     norms = [name for name in record.words("norm") if name != TYPICAL_NORM]
     orders = [levels.orders(record, quantity, shown) for quantity in found]
-    checked = [check.value for check in choice.asked_values(experiment)]
+    checked = [check.value for check in choice.asked_values(record)]
     wanted = [
-        *orders[:1], best.table(model, record, shown, checked), theory.schemes(experiment, record), *orders[1:],
-        degrees.table(experiment), levels.scalars(record, shown), levels.events(record), *theory.predictions(record),
+        *orders[:1], best.table(record, shown, checked), theory.schemes(record), *orders[1:],
+        degrees.table(record.experiment), levels.scalars(record, shown), levels.events(record),
+        *theory.predictions(record),
         # energy changed by damping or a force is not an error of the scheme
         *((levels.velocities(record), levels.maxima(record, shown)) if model.conservative else ()),
-        None if data.is_lean(record) else work.table(experiment, record),
+        None if record.is_lean else work.table(record),
     ]  # fmt: skip
     if everyone is not None and len(everyone.rows) <= MOST_ROWS:
         wanted.append(everyone)

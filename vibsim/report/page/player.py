@@ -19,15 +19,13 @@ from typing import Any
 import numpy as np
 
 from vibsim.core.array_types import Floats
-from vibsim.core.record import Record
 from vibsim.report import choice, data, frame, style, words
-from vibsim.report.data import Member
+from vibsim.report.data import Ladder, Member, Results
 from vibsim.report.figures import moments, scenes
 from vibsim.report.figures.moments import SECONDS_A_PERIOD, UNBOUNDED, VISIBLE
 from vibsim.report.figures.scenes import Motion, Part, Scene
 from vibsim.report.page.templates import environment, markup, source
 from vibsim.report.series import parameters_of
-from vibsim.report.types import Experiment
 
 FRAMES_A_PERIOD = 48  # if there is room
 FEWEST_FRAMES_A_PERIOD = 20  # only the beginning of a longer run is shown
@@ -52,26 +50,26 @@ class Lane:
     """The last time of the run; the player may show only the beginning."""
 
 
-def element(experiment: Experiment, record: Record) -> str:
+def element(record: Results) -> str:
     """Return the player as HTML, with its script and its style; empty if the system cannot be drawn."""
-    shown = lanes(experiment, record)
+    shown = lanes(record)
     if not shown:
         return ""
     files = {name: source(f"player.{name}") for name in ("js", "css")}
     return environment().get_template("player.html").render(_context(record, shown) | files)
 
 
-def lanes(experiment: Experiment, record: Record) -> list[Lane]:
+def lanes(record: Results) -> list[Lane]:
     """Return the one or two motions of the player; empty if the system cannot be drawn or does not move."""
-    model = experiment.model.definition
+    model = record.model
     draw = scenes.scene_of(model)
-    if draw is None or data.is_lean(record) or f"{model.position}_finest" not in record:
+    if draw is None or record.is_lean or f"{model.position}_finest" not in record:
         return []
-    chosen = _chosen(experiment, record, _member(experiment, record))
+    chosen = _chosen(record, _member(record))
     if not chosen:
         return []
     first, _, states = chosen[0]
-    samples = data.times(record, first.case)
+    samples = record.times(first.case)
     period = moments.period(samples, states[model.position])
     has_few = samples.size * period < moments.FEWEST_SAMPLES * float(samples[-1] - samples[0])
     if has_few and model.kind != "bouncing_ball":
@@ -82,7 +80,7 @@ def lanes(experiment: Experiment, record: Record) -> list[Lane]:
     reach = {
         name: max(data.largest(series[name][there]) for _, _, series in chosen) for name in states
     }
-    parameters = parameters_of(experiment, record, first.case)
+    parameters = parameters_of(record, first.case)
     found = []
     for one, level, series in chosen:
         motion = moments.motion(model, t, samples, series, parameters, reach)
@@ -91,25 +89,23 @@ def lanes(experiment: Experiment, record: Record) -> list[Lane]:
     return found
 
 
-def _member(experiment: Experiment, record: Record) -> Member:
+def _member(record: Results) -> Member:
     """Return the first scheme and, in a sweep, a typical member."""
-    found = choice.quantities(experiment, record)
+    found = choice.quantities(record)
     if not found:
-        return data.of_case(record, 0)[0]
-    members = choice.with_levels(experiment, choice.members(record, found[0]))
+        return record.of_case(0)[0]
+    members = choice.with_levels(record, choice.members(record, found[0]))
     return next((member for member in members if member.role == "typical"), members[0])
 
 
-def _chosen(
-    experiment: Experiment, record: Record, member: Member
-) -> list[tuple[Member, int, dict[str, Floats]]]:
+def _chosen(record: Results, member: Member) -> list[tuple[Member, int, dict[str, Floats]]]:
     """Return one or two motions: member, position of the level, series of the states."""
-    model = experiment.model.definition
+    model = record.model
     names = [state.name for state in model.states if f"{state.name}_finest" in record]
-    finest = len(data.whole(record, "level")) - 1
+    finest = len(record.levels) - 1
 
     def series(one: Member, level: int) -> dict[str, Floats]:
-        return {name: data.state_at(record, name, one, level) for name in names}
+        return {name: Ladder(record, name, one).on_level(level) for name in names}
 
     first = series(member, finest)
     if len(names) < len(model.states) or not all(np.isfinite(x).all() for x in first.values()):
@@ -120,7 +116,7 @@ def _chosen(
     if size == 0.0 or (math.isfinite(known) and size > frame.UNBOUNDED * known):
         return []
     others = []
-    for one in data.of_case(record, member.case):
+    for one in record.of_case(member.case):
         found = series(one, 0)
         distance = max(float(np.max(np.abs(found[name] - first[name]))) for name in positions)
         largest = max(float(np.max(np.abs(found[name]))) for name in positions)
@@ -132,11 +128,11 @@ def _chosen(
     return [(member, finest, first), (one, 0, found)]
 
 
-def _title(record: Record, member: Member, level: int) -> str:
+def _title(record: Results, member: Member, level: int) -> str:
     """Name a motion by its level and, if there are several, by scheme and member."""
-    step = words.number(float(data.steps_of(record, member.case)[level]), "brief")
-    text = f"level {data.whole(record, 'level')[level]}, dt = {step} {data.time_unit(record)}"
-    scheme = member.scheme_name if len(record["scheme"]) > 1 else ""
+    step = words.number(float(record.dt(member.case)[level]), "brief")
+    text = f"level {record.levels[level]}, dt = {step} {record.time_unit}"
+    scheme = member.scheme_name if len(record.schemes) > 1 else ""
     return ", ".join(filter(None, [scheme, text.strip(), member.case_words]))
 
 
@@ -148,7 +144,7 @@ def _times(t: Floats, period: float, count: int) -> Floats:
     return np.linspace(float(t[0]), float(t[0]) + end, min(most, wanted) + 1)
 
 
-def _context(record: Record, shown: list[Lane]) -> dict[str, Any]:
+def _context(record: Results, shown: list[Lane]) -> dict[str, Any]:
     """Return the content of the template."""
     t, period, position = shown[0].motion.t, shown[0].period, shown[0].motion.model.position
     whole = float(t[-1] - t[0])
@@ -160,7 +156,7 @@ def _context(record: Record, shown: list[Lane]) -> dict[str, Any]:
     zero = EDGE + scale * high
     content = {
         "t": [float(t[0]), float(t[-1])],
-        "unit": data.time_unit(record),
+        "unit": record.time_unit,
         "pace": period / SECONDS_A_PERIOD,
         "window": window,
         "size": TRACE,
@@ -170,7 +166,7 @@ def _context(record: Record, shown: list[Lane]) -> dict[str, Any]:
         ],
     }
     last = shown[0].end
-    unit = data.unit(record, f"{position}_finest")
+    unit = record.unit(f"{position}_finest")
     return {
         # escaped, so that no text can end the script element
         "data": markup(json.dumps(content, separators=(",", ":")).replace("<", "\\u003c")),
@@ -185,7 +181,7 @@ def _context(record: Record, shown: list[Lane]) -> dict[str, Any]:
         "label": style.label(words.symbol(position), unit),
         "from": words.number(float(t[0]), "step"),
         "to": words.number(float(f"{t[0] + window:.3g}"), "step"),
-        "unit": data.time_unit(record),
+        "unit": record.time_unit,
         "shown": words.number(float(f"{t[-1]:.3g}"), "step") if t[-1] < 0.999 * last else "",
         "length": words.number(last, "step"),
     }

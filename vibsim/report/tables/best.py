@@ -10,10 +10,13 @@ import math
 from collections.abc import Collection, Iterator, Sequence
 
 from vibsim.comparison.best_values import WORDS, Scalar, scalars
-from vibsim.core.record import Record
 from vibsim.models import Model
 from vibsim.report import style, words
-from vibsim.report.data import Member, at, exact_periods, exact_series, flags, swept, unit, whole
+from vibsim.report.data import (
+    Ladder,
+    Member,
+    Results,
+)
 from vibsim.report.tables.table import Cell, Column, Table, Written
 from vibsim.schemes.orders import is_autonomous
 
@@ -34,22 +37,20 @@ PER_NUMBER = ("finest level", "GCI", "GCI relative", "order", "levels", "converg
 """Columns whose data are stored only with series."""
 
 
-def table(
-    model: Model, record: Record, shown: Sequence[Member], checked: Collection[str] = ()
-) -> Table | None:
+def table(record: Results, shown: Sequence[Member], checked: Collection[str] = ()) -> Table | None:
     """Return the best value of every number of the members; None without numbers, or for a single level.
 
     `checked` are the names of the numbers of checks.
     """
-    if len(whole(record, "level")) < 2 or "period_richardson" not in record:
+    if len(record.levels) < 2 or "period_richardson" not in record:
         return None
     columns = (
-        Column("number"), Column("scheme"), *([Column("member")] if swept(record) else []),
+        Column("number"), Column("scheme"), *([Column("member")] if record.swept else []),
         Column("finest level", form="full"), Column("GCI", form="small"), Column("GCI relative", form="small"),
         Column("best value", form="full"), Column("bound", form="small"), Column("true error", form="small"),
         Column("order", form="order"), Column("levels"), Column("convergence"),
     )  # fmt: skip
-    rows = tuple(_rows(model, record, shown, checked))
+    rows = tuple(_rows(record, shown, checked))
     if not rows:
         return None
     text = (
@@ -76,27 +77,26 @@ def numbers(model: Model, is_lean: bool, checked: Collection[str]) -> list[tuple
 
 
 def _rows(
-    model: Model, record: Record, shown: Sequence[Member], checked: Collection[str]
+    record: Results, shown: Sequence[Member], checked: Collection[str]
 ) -> Iterator[tuple[Cell, ...]]:
     has_series = "scalar" in record
-    for k, row in numbers(model, not has_series, checked):
+    for k, row in numbers(record.model, not has_series, checked):
         name, nothing = row.variable, (None, None, None)
-        is_named = row.quantity in words.NAMES or (row.quantity and model.coordinates > 1)
+        is_named = row.quantity in words.NAMES or (row.quantity and record.model.coordinates > 1)
         text = f"{words.symbol(row.quantity)} {WORDS[row.value]}" if is_named else row.words
-        title = style.label(text, unit(record, f"{name}_richardson"))
+        title = style.label(text, record.unit(f"{name}_richardson"))
         for member in shown:
-            value = float(at(record, f"{name}_richardson", member))
-            bound = float(at(record, f"{name}_richardson_error", member))
+            value, bound = best_value(record, name, member)
             if not math.isfinite(value):
                 continue
             if row.value in OF_A_PERIODIC_MOTION and abs(value) <= bound:
                 # its levels do not tell whether there is a period at all
                 continue
-            index = float(at(record, f"{name}_gci", member)) if has_series else math.nan
+            index = float(record.at(f"{name}_gci", member)) if has_series else math.nan
             yield (
                 title,
                 member.scheme_name,
-                *([member.case_name] if swept(record) else []),
+                *([member.case_name] if record.swept else []),
                 *(_finest(record, index, k, member) if has_series else nothing),
                 best(row.value, value, bound if math.isfinite(bound) else index),
                 Written(bound, "unknown") if math.isnan(bound) else error_size(bound),
@@ -105,10 +105,16 @@ def _rows(
             )
 
 
-def _finest(record: Record, index: float, k: int, member: Member) -> tuple[Cell, Cell, Cell]:
+def best_value(record: Results, name: str, member: Member) -> tuple[float, float]:
+    """Return the best value of a number with its bound."""
+    field = f"{name}_richardson"
+    return float(record.at(field, member)), float(record.at(f"{field}_error", member))
+
+
+def _finest(record: Results, index: float, k: int, member: Member) -> tuple[Cell, Cell, Cell]:
     """Return the value of the finest level and its grid convergence index, absolute and relative."""
     value, relative = (
-        float(at(record, f"scalar_{field}", member, scalar=k)) for field in ("finest", "gci")
+        float(record.at(f"scalar_{field}", member, scalar=k)) for field in ("finest", "gci")
     )
     return rounded(value, index), error_size(index), error_size(relative)
 
@@ -138,28 +144,27 @@ def rounded(value: float, error: float) -> Written:
     return Written(value, words.printed(f"{value:.{max(decimals + size, 0)}e}"))
 
 
-def used_levels(record: Record, k: int, member: Member) -> tuple[int, int]:
+def used_levels(record: Results, k: int, member: Member) -> tuple[int, int]:
     """Return the coarsest and the finest level that the best value of the k-th number uses."""
-    first, last = (int(at(record, f"scalar_{end}", member, scalar=k)) for end in ("first", "last"))
+    first, last = (int(record.at(f"scalar_{end}", member, scalar=k)) for end in ("first", "last"))
     return first, last
 
 
-def _approach(record: Record, k: int, member: Member) -> tuple[Cell, Cell, Cell]:
+def _approach(record: Results, k: int, member: Member) -> tuple[Cell, Cell, Cell]:
     """Return the observed order, the levels used, and the kind of convergence."""
     first, last = used_levels(record, k, member)
     used = words.levels((first, last)) if first < last else f"{last}, not extrapolated"
-    order = float(at(record, "scalar_order", member, scalar=k))
-    kind = str(flags(record, "scalar_convergence")[k, member.scheme, member.case])
+    order = float(record.at("scalar_order", member, scalar=k))
+    kind = str(record.flags("scalar_convergence")[k, *member.place])
     return order if math.isfinite(order) else None, used, CLASSES[kind]
 
 
-def _exact(record: Record, name: str, member: Member) -> float:
+def _exact(record: Results, name: str, member: Member) -> float:
     """Return the exact value of a number; NaN if it is unknown."""
     if name == "period":
-        return float(exact_periods(record)[member.case])
+        return float(record.exact_periods[member.case])
     quantity, _, which = name.rpartition("_")
+    ladder = Ladder(record, quantity, member)
     # the common times need not include the end
     has_end = which == "end" and record.attrs.get("end_included")
-    if not has_end or f"{quantity}_exact" not in record:
-        return math.nan
-    return float(exact_series(record, quantity, member)[-1])
+    return float(ladder.exact[-1]) if has_end and "exact" in ladder else math.nan

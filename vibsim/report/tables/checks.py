@@ -6,8 +6,8 @@ from collections.abc import Mapping
 from operator import itemgetter
 from typing import Any
 
-from vibsim.core.record import Record
-from vibsim.report import data, words
+from vibsim.report import words
+from vibsim.report.data import Results
 from vibsim.report.tables.table import Cell, Column, Filled, Table, Written, filled, keyed
 
 ROUND_OFF = 1e-12  # numbers up to this have two digits: more would be noise
@@ -32,11 +32,11 @@ def checks(summary: Mapping[str, Any]) -> Table:
     return Table("checks", "Checks: expected and measured", columns, rows)
 
 
-def results(record: Record, check: Mapping[str, Any], unit: str) -> Table:
+def results(record: Results, check: Mapping[str, Any], unit: str) -> Table:
     """Return the table of the results of one check; `unit` is that of its numbers."""
     listed, kind = check["results"], check["kind"]
     columns: list[Filled] = [keyed("scheme")]
-    if data.swept(record):
+    if record.swept:
         columns += [keyed("case", form="integer")]
         columns += [(Column("member"), lambda result: member(record, result["case"]) or "all")]
     columns += [(Column("measured"), itemgetter("status")), keyed("reason")]
@@ -47,7 +47,7 @@ def results(record: Record, check: Mapping[str, Any], unit: str) -> Table:
             (Column("levels"), lambda result: words.levels(words.levels_of(result))),
         ]
     if kind == "accurate":
-        measure = data.norm_unit(record, check["quantity"], "l2")
+        measure = record.norm_unit(check["quantity"], "l2")
         columns += [
             (Column("L2 error", measure, "small"), lambda result: words.fact(result, "error")),
             (
@@ -68,20 +68,20 @@ def _value(result: Mapping[str, Any]) -> Cell:
     return Written(value, words.number(value, "brief")) if is_noise and value else value
 
 
-def member(record: Record, case: int) -> str:
+def member(record: Results, case: int) -> str:
     """Name a member by its global index; empty if the record lacks it."""
-    place = data.case_position(record, case)
-    return "" if place is None else data.case_name(record, place)
+    place = record.case_position(case)
+    return "" if place is None else record.case_name(place)
 
 
-def failures(summary: Mapping[str, Any], record: Record) -> Table | None:
+def failures(summary: Mapping[str, Any], record: Results) -> Table | None:
     """Return the runs that broke down; None if there are none."""
     if not summary["failures"]:
         return None
     columns: list[Filled] = [
         keyed("scheme"), keyed("level", form="integer"), keyed("case", form="integer"),
         (Column("member"), lambda row: member(record, row["case"])),
-        keyed("t", data.time_unit(record), "step"), keyed("step", form="integer"), keyed("error"),
+        keyed("t", record.time_unit, "step"), keyed("step", form="integer"), keyed("error"),
     ]  # fmt: skip
     caption = "Runs that broke down: the first moment at which the solution was not finite"
     return filled("failures", caption, columns, summary["failures"])

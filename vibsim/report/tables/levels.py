@@ -12,10 +12,9 @@ from collections.abc import Callable, Sequence
 import numpy as np
 
 from vibsim.core.array_types import Flags, Floats
-from vibsim.core.record import Record
 from vibsim.core.vocabulary import MEMBER, OF_LEVEL, ORDER_TOLERANCE, TYPICAL_NORM
-from vibsim.report import data, frame, style, words
-from vibsim.report.data import Member, optional, time_unit, unit, whole
+from vibsim.report import frame, style, words
+from vibsim.report.data import Ladder, Member, Results
 from vibsim.report.tables.table import Cell, Column, Table, Written
 
 OWN, CENTRED = "energy_deviation_max_abs", "energy_deviation_d2t_max_abs"
@@ -26,7 +25,7 @@ Fill = Callable[[Member, int], Cell]
 
 
 def by_level(
-    record: Record,
+    record: Results,
     name: str,
     caption: str,
     members: Sequence[Member],
@@ -40,7 +39,7 @@ def by_level(
     `filled` are the columns after scheme, member and level, each with its fill function (None is left out). In a
     `titled` table scheme and member share a column.
     """
-    names = ["scheme", "member"] if data.swept(record) and not titled else ["scheme"]
+    names = ["scheme", "member"] if record.swept and not titled else ["scheme"]
     shown = [column for column in filled if column is not None]
     columns = (*map(Column, names), Column("level", form="integer"), *(c for c, _ in shown))
     rows = []
@@ -48,10 +47,10 @@ def by_level(
         # with the dotted keys of the experiment file
         heads = [text for text in (member.scheme_name, member.case_name) if text]
         heads = [", ".join(heads)] if titled else heads
-        for i, level in enumerate(whole(record, "level")):
+        for i, level in enumerate(record.levels):
             if included is None or included[member.scheme, member.case, i]:
                 rows.append((*heads, level, *(fill(member, i) for _, fill in shown)))
-    return Table(name, caption, columns, tuple(rows), len(names) if data.swept(record) else 0)
+    return Table(name, caption, columns, tuple(rows), len(names) if record.swept else 0)
 
 
 def _cells(values: Floats, kind: type[int] | type[float] = float) -> Fill:
@@ -59,28 +58,27 @@ def _cells(values: Floats, kind: type[int] | type[float] = float) -> Fill:
     return lambda member, i: kind(values[member.scheme, member.case, i])
 
 
-def _step_column(record: Record) -> tuple[Column, Fill]:
+def _step_column(record: Results) -> tuple[Column, Fill]:
     """Return the column of the time steps."""
-    column = Column("dt", time_unit(record, "dt"), "step")
-    return column, lambda member, i: float(data.steps_of(record, member.case)[i])
+    column = Column("dt", record.time_unit, "step")
+    return column, lambda member, i: float(record.dt(member.case)[i])
 
 
 def orders(
-    record: Record, quantity: str, shown: Sequence[Member], norm: str = TYPICAL_NORM
+    record: Results, quantity: str, shown: Sequence[Member], norm: str = TYPICAL_NORM
 ) -> Table:
     """Return norms, ratios and orders of a quantity, one row per scheme, member and level."""
-    measure = data.norm_unit(record, quantity, norm)
-    letter, pairs = words.symbol(quantity), bool(whole(record, "pair"))
-    triples = bool(whole(record, "triple"))
-    floors = {member: data.floor_norm(record, quantity, member, norm) for member in shown}
-    notes = {member: _notes(record, quantity, member, norm) for member in shown}
+    measure, letter = record.norm_unit(quantity, norm), words.symbol(quantity)
+    pairs, triples = bool(record.pairs), bool(record.triples)
+    floors = {member: Ladder(record, quantity, member).floor(norm) for member in shown}
+    notes = {member: _notes(Ladder(record, quantity, member), norm) for member in shown}
 
     def cells(name: str) -> Fill:
-        values = optional(record, f"{quantity}_{name}", (*MEMBER, "level"), norm)
+        values = record.optional(f"{quantity}_{name}", (*MEMBER, "level"), norm)
         return lambda m, i: float(values[m.scheme, m.case, i]) if i < values.shape[2] else math.nan
 
     filled = (
-        (Column("steps", form="integer"), lambda member, i: int(record["steps"][i])),
+        (Column("steps", form="integer"), lambda member, i: record.steps[i]),
         _step_column(record),
         (Column("difference", measure, "norm"), cells("difference_norm")) if pairs else None,
         (Column("ratio", form="order"), cells("ratio_norm")) if triples else None,
@@ -95,13 +93,12 @@ def orders(
     return by_level(record, f"orders_{quantity}_{norm}", caption, shown, filled)
 
 
-def _notes(record: Record, quantity: str, member: Member, norm: str) -> list[str]:
+def _notes(ladder: Ladder, norm: str) -> list[str]:
     """Return for every level whether the stated order uses the three levels from there on, or why not."""
-    levels, (first, last) = whole(record, "level"), data.window(record, quantity, member)
-    stated, *_ = data.stated_order(record, quantity, member, norm)
-    orders = optional(record, f"{quantity}_observed_order", (*MEMBER, "level"), norm)
-    local = orders[member.scheme, member.case]
-    above = data.sound_pairs(record, quantity, member) if len(levels) > 1 else []
+    levels, (first, last) = ladder.record.levels, ladder.window
+    stated, *_ = ladder.stated_order(norm)
+    local = ladder.optional("observed_order", ("level",), norm)
+    above = ladder.sound_pairs if len(levels) > 1 else []
     notes = []
     for i, level in enumerate(levels):
         positions, has_three = list(range(i, min(i + 3, len(levels)))), i + 2 < len(levels)
@@ -113,16 +110,15 @@ def _notes(record: Record, quantity: str, member: Member, norm: str) -> list[str
         elif all(above[k] for k in positions[:-1]):
             notes.append("no" if has_three else "–")
         else:
-            lost = frame.why_lost(record, quantity, member, positions, np.zeros(1))
-            notes.append(lost.removeprefix("lost in "))
+            notes.append(frame.why_lost(ladder, positions, np.zeros(1)).removeprefix("lost in "))
     return notes
 
 
-def maxima(record: Record, shown: Sequence[Member]) -> Table | None:
+def maxima(record: Results, shown: Sequence[Member]) -> Table | None:
     """Return max|ΔE| over all steps, with and without the last point, and the ratios of successive levels."""
     if OWN not in record:
         return None
-    measure, several = unit(record, OWN), len(whole(record, "level")) > 1
+    measure, several = record.unit(OWN), len(record.levels) > 1
     filled: list[tuple[Column, Fill]] = []
     for name, text, ratio in (
         (OWN, "max |ΔE|", "ratio"),
@@ -130,7 +126,7 @@ def maxima(record: Record, shown: Sequence[Member]) -> Table | None:
     ):
         # lean records lack the second
         if name in record:
-            values, is_sound = optional(record, name, OF_LEVEL), record["status"] == 0
+            values, is_sound = record.optional(name, OF_LEVEL), record["status"] == 0
             filled.append((Column(text, measure, "norm"), _cells(values)))
             if several:
                 filled.append((Column(ratio, form="order"), _cells(_ratios(values, is_sound))))
@@ -147,12 +143,12 @@ def _ratios(values: Floats, is_sound: Flags) -> Floats:
     return ratios
 
 
-def scalars(record: Record, shown: Sequence[Member]) -> Table | None:
+def scalars(record: Results, shown: Sequence[Member]) -> Table | None:
     """Return period, amplitude and the period's error on every level."""
-    period, exact = optional(record, "period", OF_LEVEL), data.exact_periods(record)
+    period, exact = record.optional("period", OF_LEVEL), record.exact_periods
     if not np.isfinite(period).any():
         return None
-    time, angle = unit(record, "period"), unit(record, "amplitude")
+    time, angle = record.unit("period"), record.unit("amplitude")
     usable = np.where(np.isfinite(exact), exact, np.nan)[:, None]
     filled = (
         (Column("period", time, "full"), _cells(period)),
@@ -165,20 +161,20 @@ def scalars(record: Record, shown: Sequence[Member]) -> Table | None:
     return by_level(record, "scalars", caption, shown, filled, titled=True)
 
 
-def velocities(record: Record) -> Table | None:
+def velocities(record: Results) -> Table | None:
     """Return the largest relative energy error with both velocities; None if no scheme has its own velocity."""
-    if CENTRED not in record or not np.isfinite(optional(record, CENTRED, OF_LEVEL)).any():
+    if CENTRED not in record or not np.isfinite(record.optional(CENTRED, OF_LEVEL)).any():
         return None
-    first = style.positive(np.abs(optional(record, "energy_initial", MEMBER)))[..., None]
+    first = style.positive(np.abs(record.optional("energy_initial", MEMBER)))[..., None]
     own, centred, interior = (
-        optional(record, name, OF_LEVEL) / first for name in (OWN, CENTRED, f"{OWN}_interior")
+        record.optional(name, OF_LEVEL) / first for name in (OWN, CENTRED, f"{OWN}_interior")
     )
     # a scheme without its own velocity uses the centred difference, except at the last step
     is_same = np.asarray(np.isnan(centred).all(axis=-1))
     second = np.where(is_same[..., None], interior, centred)
     is_named = "energy_drift_kind" in record
-    kinds = data.flags(record, "energy_drift_kind") if is_named else np.full(own.shape, "")
-    rates = optional(record, "energy_drift_rate", OF_LEVEL)
+    kinds = record.flags("energy_drift_kind") if is_named else np.full(own.shape, "")
+    rates = record.optional("energy_drift_rate", OF_LEVEL)
 
     def quotient(member: Member, i: int) -> Cell:
         place = member.scheme, member.case, i
@@ -204,7 +200,7 @@ def velocities(record: Record) -> Table | None:
         (Column("second over first", form="norm"), quotient),
         (Column("drift of the energy, own velocity"), drift) if is_named else None,
     )
-    return by_level(record, "energy_velocities", caption, data.all_members(record), filled)
+    return by_level(record, "energy_velocities", caption, record.all_members, filled)
 
 
 def _plain(quotient: float) -> Cell:
@@ -216,10 +212,10 @@ def _plain(quotient: float) -> Cell:
     return Written(quotient, f"{quotient:.{places}f}")
 
 
-def events(record: Record) -> Table | None:
+def events(record: Results) -> Table | None:
     """Return number and times of impacts, turns under friction and rest; None if there are none."""
     count, first, last, rest_time = (
-        optional(record, name, OF_LEVEL)
+        record.optional(name, OF_LEVEL)
         for name in ("event_count", "first_event_time", "last_event_time", "rest_time")
     )
     if not (count > 0.0).any():
@@ -228,7 +224,7 @@ def events(record: Record) -> Table | None:
         "Events (impacts; turns and starts of a body under friction; events of the file): where they are located, "
         "their times move with the level as the error of the scheme does, else by part of a step"
     )
-    seconds, has_rest = time_unit(record, "first_event_time"), np.isfinite(rest_time).any()
+    seconds, has_rest = record.time_unit, np.isfinite(rest_time).any()
 
     def change(member: Member, i: int) -> Cell:
         """Return the time of the last event minus that on the next finer level; None if it is a different event."""
@@ -244,4 +240,4 @@ def events(record: Record) -> Table | None:
         (Column("at rest from", seconds, "value"), _cells(rest_time)) if has_rest else None,
         (Column("last, less that of the next finer level", seconds, "small"), change),
     )
-    return by_level(record, "events", caption, data.all_members(record), filled)
+    return by_level(record, "events", caption, record.all_members, filled)

@@ -14,17 +14,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vibsim import store
-from vibsim.core.record import Record
 from vibsim.report import finest_level, words
 from vibsim.report.data import (
-    exact_periods,
-    flags,
-    norm_unit,
-    stated_orders,
-    swept,
-    swept_label,
-    unit,
-    whole,
+    Results,
 )
 from vibsim.report.tables.table import Column, Table, csv_line
 
@@ -38,21 +30,21 @@ Field = tuple[Column, NDArray[Any]]
 """A column and its values, shape (scheme, case)."""
 
 
-def fields(record: Record, quantity: str) -> list[Field]:
+def fields(record: Results) -> list[Field]:
     """Return the fields of every member: index and swept values first, then the measured ones.
 
     A member whose order is undecided has none.
     """
-    error, error_unit = finest_level.error(record, quantity), norm_unit(record, quantity)
-    time, size = (finest_level.measured(record, name, quantity) for name in ("period", "amplitude"))
-    level = whole(record, "level")[-1]
+    quantity, level = record.model.position, record.levels[-1]
+    error, error_unit = finest_level.error(record, quantity), record.norm_unit(quantity)
+    time, size = (finest_level.measured(record, name) for name in ("period", "amplitude"))
     names = [f"order of {words.symbol(quantity)}", "order, low", "order, high"]
-    orders = zip(names, stated_orders(record, quantity), strict=True)
+    orders = zip(names, record.stated_orders(quantity), strict=True)
     listed: list[Field] = [
         (Column("case", form="integer"), np.asarray(record["case"])),
-        *((Column(*swept_label(record, name), "step"), record[name]) for name in swept(record)),
+        *((Column(*record.swept_label(name), "step"), record[name]) for name in record.swept),
         *(
-            (Column(name), flags(record, f"{quantity}_{name}"))
+            (Column(name), record.flags(f"{quantity}_{name}"))
             for name in ("status", "reason")
             if f"{quantity}_{name}" in record
         ),
@@ -60,22 +52,22 @@ def fields(record: Record, quantity: str) -> list[Field]:
         (Column(f"true error, level {level}", error_unit, "norm"), error.true),
         (Column(f"estimated error, level {level}", error_unit, "norm"), error.estimate),
         (Column("period", time.unit, "full"), time.value),
-        (Column("exact period", unit(record, "exact_period"), "full"), exact_periods(record)),
+        (Column("exact period", record.unit("exact_period"), "full"), record.exact_periods),
         (Column("relative error of the period", form="norm"), finest_level.period_error(record, -1)),
         (Column("amplitude", size.unit, "full"), size.value),
     ]  # fmt: skip
-    shape = len(record["scheme"]), len(record["case"])
+    shape = len(record.schemes), record.count
     return [(column, np.broadcast_to(values, shape)) for column, values in listed]
 
 
-def table(record: Record, quantity: str) -> Table | None:
+def table(record: Results) -> Table | None:
     """Return one row per scheme and member of a sweep; None without a sweep, or for too many rows."""
-    schemes = record.words("scheme")
-    if not swept(record) or len(record["case"]) * len(schemes) > LISTED:
+    schemes = record.schemes
+    if not record.swept or record.count * len(schemes) > LISTED:
         return None
     shown = [
         (column, values)
-        for column, values in fields(record, quantity)
+        for column, values in fields(record)
         if values.dtype.kind != "f" or np.isfinite(values).any()
     ]
     rows = [
@@ -83,20 +75,21 @@ def table(record: Record, quantity: str) -> Table | None:
         for s, scheme in enumerate(schemes)
         for row in zip(*(values[s].tolist() for _, values in shown), strict=True)
     ]
-    caption = f"Members: order of {words.symbol(quantity)} ({words.USUAL_NORM}), and numbers of the finest level"
+    order = f"order of {words.symbol(record.model.position)} ({words.USUAL_NORM})"
+    caption = f"Members: {order}, and numbers of the finest level"
     columns = (Column("scheme"), *(column for column, _ in shown))
     return Table("members", caption, columns, tuple(rows))
 
 
-def write_csv(path: Path, record: Record, quantity: str) -> None:
+def write_csv(path: Path, record: Results) -> None:
     """Write one row per scheme and member, with empty cells for missing numbers.
 
     Swept values have all digits. Measured numbers have all digits in files of up to `LISTED` rows, and `DIGITS`
     significant digits in longer ones (``convergence.nc`` has all of them).
     """
-    listed, schemes = fields(record, quantity), record.words("scheme")
-    keys = 1 + len(swept(record))
-    is_short = len(record["case"]) * len(schemes) <= LISTED
+    listed, schemes = fields(record), record.schemes
+    keys = 1 + len(record.swept)
+    is_short = record.count * len(schemes) <= LISTED
     head = [column.title for column, _ in listed]
     with (
         store.replacing(path) as temporary,
@@ -110,11 +103,11 @@ def write_csv(path: Path, record: Record, quantity: str) -> None:
                 file.write(text.replace(SCHEME, csv_line([scheme])[:-1]))
 
 
-def digits(record: Record) -> str:
+def digits(record: Results) -> str:
     """Say what the file of members holds; empty without a sweep."""
-    if not swept(record):
+    if not record.swept:
         return ""
-    count = len(record["case"]) * len(record["scheme"])
+    count = record.count * len(record.schemes)
     listed = f"`tables/members.csv` lists all {words.number(count, 'integer')} members"
     if count <= LISTED:
         return f"{listed}."

@@ -9,11 +9,11 @@ from typing import Any
 import numpy as np
 
 from vibsim.checks.fields import field_values
-from vibsim.core.record import Record
 from vibsim.core.vocabulary import CENTRED
 from vibsim.experiment.sweep_columns import members_with, recorded_columns
 from vibsim.experiment.value_names import VALUES
-from vibsim.report import data, words
+from vibsim.report import words
+from vibsim.report.data import Results
 from vibsim.report.tables.table import Cell, Column, Table, Written
 from vibsim.report.types import Experiment, PublishedRow, PublishedTable
 
@@ -41,20 +41,20 @@ def sentence(compared: list[Table]) -> str:
     return text if marks else ""
 
 
-def tables(experiment: Experiment, record: Record, summary: Mapping[str, Any]) -> list[Table]:
+def tables(record: Results, summary: Mapping[str, Any]) -> list[Table]:
     """Return one table for each table of printed numbers."""
     from vibsim.experiment.schema.published import row_id
 
     checks = {check["id"]: check for check in summary["checks"]}
     compared = []
-    for i, table in enumerate(experiment.published, 1):
+    for i, table in enumerate(record.experiment.published, 1):
         columns = _columns(record, table)
         rows = tuple(
             tuple(_row(record, row_id(i, j), table, row, columns, checks))
             for j, row in enumerate(table.rows, 1)
         )
         of = f" of {words.symbol(table.quantity)}" if table.quantity else ""
-        origin = table.source or experiment.source
+        origin = table.source or record.experiment.source
         caption = (
             f"{table.title}{f' ({origin})' if origin else ''}. Ours: {words.spelled(table.value)}{of}; it agrees if it "
             "differs by at most half a unit of the last printed digit"
@@ -63,12 +63,12 @@ def tables(experiment: Experiment, record: Record, summary: Mapping[str, Any]) -
     return compared
 
 
-def _columns(record: Record, table: PublishedTable) -> tuple[Column, ...]:
+def _columns(record: Results, table: PublishedTable) -> tuple[Column, ...]:
     rows = table.rows
     at = [key for key in PLACES if any(getattr(row.at, key) is not None for row in rows)]
     at += dict.fromkeys(key for row in rows for key in row.at.swept)
     return (
-        Column("scheme"), Column("level"), Column("dt", data.time_unit(record, "dt"), "step"),
+        Column("scheme"), Column("level"), Column("dt", record.time_unit, "step"),
         *(Column(key, form="step") for key in at),
         Column("printed", form="printed"), Column("ours", form="close"), Column("difference", form="brief"),
         Column(AGREES), *(Column(_beside_header(name, table), form="norm") for name in table.beside),
@@ -85,7 +85,7 @@ def _beside_header(name: str, table: PublishedTable) -> str:
 
 
 def _row(
-    record: Record,
+    record: Results,
     name: str,
     table: PublishedTable,
     row: PublishedRow,
@@ -94,16 +94,14 @@ def _row(
 ) -> Iterator[Cell]:
     headers = [column.header for column in columns]
     # by default the first member
-    case = 0 if row.at.case is None else data.case_position(record, row.at.case) or 0
+    case = 0 if row.at.case is None else record.case_position(row.at.case) or 0
     if row.at.swept:
-        case = int(
-            np.argmax(members_with(recorded_columns(record), row.at.swept, len(record["case"])))
-        )
-    scheme = record.words("scheme").index(row.scheme)
+        case = int(np.argmax(members_with(recorded_columns(record), row.at.swept, record.count)))
+    scheme = record.schemes.index(row.scheme)
     ours = float(field_values(record, name, "value")[scheme, case])
-    levels: list[int | str] = [*data.whole(record, "level")]
+    levels: list[int | str] = [*record.levels]
     level = levels[-1] if row.level is None else row.level
-    steps = dict(zip(levels, data.steps_of(record, case).tolist(), strict=True))
+    steps = dict(zip(levels, record.dt(case).tolist(), strict=True))
     yield row.scheme
     yield str(level)
     # the extrapolated solution has no step
@@ -116,7 +114,7 @@ def _row(
     yield _agrees(checks.get(name, {}).get("status"), row)
     if table.beside:
         check = record.words("check").index(name)
-        values = data.pick(record, "published_beside", check=check, case=case)
+        values = record.pick("published_beside", check=check, case=case)
         yield from (float(value) for value in values[: len(table.beside)])
     if "why" in headers:
         yield row.note or ""

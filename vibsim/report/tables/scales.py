@@ -4,18 +4,17 @@ from __future__ import annotations
 
 import numpy as np
 
-from vibsim.core.record import Record
 from vibsim.experiment.sweep_columns import recorded_columns
 from vibsim.models.shared.scales import dimensionless, scales
 from vibsim.report import data
+from vibsim.report.data import Results
 from vibsim.report.style import finite
 from vibsim.report.tables.table import Cell, Column, Table
-from vibsim.report.types import Experiment
 
 
-def table(experiment: Experiment, record: Record) -> Table | None:
+def table(record: Results) -> Table | None:
     """Return the ranges of scales and dimensionless numbers over the members; None if the model defines none."""
-    model, scaling = experiment.model.definition, experiment.scaling
+    model, scaling = record.model, record.experiment.scaling
     if model.scales is None:
         return None
     if scaling is None:
@@ -23,8 +22,8 @@ def table(experiment: Experiment, record: Record) -> Table | None:
         parameters, initial = (
             {key: swept.get(f"{section}.{key}", value) for key, value in values.items()}
             for section, values in (
-                ("model", experiment.model.parameters),
-                ("initial", experiment.initial),
+                ("model", record.experiment.model.parameters),
+                ("initial", record.experiment.initial),
             )
         )
     else:

@@ -12,13 +12,11 @@ from dataclasses import replace
 import numpy as np
 
 from vibsim.core.array_types import Floats
-from vibsim.core.record import Record
 from vibsim.core.vocabulary import MEMBER, OF_LEVEL, PEAKS
-from vibsim.report import choice, data, words
-from vibsim.report.data import Member, optional, swept, whole
+from vibsim.report import words
+from vibsim.report.data import Member, Results
 from vibsim.report.tables.levels import Fill, by_level
 from vibsim.report.tables.table import Cell, Column, Table, Written
-from vibsim.report.types import Experiment
 
 LIMITS = {0.0: "never", math.inf: "any"}  # words for special limits of stability
 EDGE = 1e-9  # relative distance within which a step is at the limit of stability
@@ -26,18 +24,18 @@ ROUNDINGS = 32.0
 """Rounding errors per step of a period within which a prediction and a measurement agree."""
 
 
-def predicted(record: Record) -> bool:
+def predicted(record: Results) -> bool:
     """Return whether the record has predictions of theory, as for linear models."""
-    return bool(np.isfinite(optional(record, "theory_growth", OF_LEVEL)).any())
+    return bool(np.isfinite(record.optional("theory_growth", OF_LEVEL)).any())
 
 
-def schemes(experiment: Experiment, record: Record) -> Table | None:
+def schemes(record: Results) -> Table | None:
     """Return one row per scheme with its stated properties and measured orders; None for a single scheme."""
-    names = record.words("scheme")
+    names = record.schemes
     if len(names) < 2:
         return None
-    quantities = [choice.position(experiment)]
-    if experiment.model.definition.conservative and "energy_deviation_order" in record:
+    quantities = [record.model.position]
+    if record.model.conservative and "energy_deviation_order" in record:
         quantities.append("energy_deviation")
     columns = [
         Column("scheme"), Column("family"), Column("type"),
@@ -46,42 +44,39 @@ def schemes(experiment: Experiment, record: Record) -> Table | None:
     for quantity in quantities:
         letter = words.symbol(quantity)
         columns.append(Column(f"order of {letter}, stated", form="step"))
-        if whole(record, "triple"):
+        if record.triples:
             columns.append(Column("measured (95 % interval)", form="order"))
-    rows = tuple(tuple(_scheme(experiment, record, s, quantities)) for s in range(len(names)))
-    is_measured = bool(whole(record, "triple"))
+    rows = tuple(tuple(_scheme(record, s, quantities)) for s in range(len(names)))
+    is_measured = bool(record.triples)
     caption = (
         "Schemes: stated properties (explicit or implicit, s: symplectic)"
         + f", and the order measured in the {words.USUAL_NORM}" * is_measured
         + " (order ∞: exact, no error to shrink)"
         + "; in a sweep, that of the member farthest from the stated order"
-        * (is_measured and bool(swept(record)))
+        * (is_measured and bool(record.swept))
     )
     return Table("schemes", caption, tuple(columns), rows)
 
 
-def _scheme(
-    experiment: Experiment, record: Record, s: int, quantities: list[str]
-) -> Iterator[Cell]:
-    spec = experiment.schemes[s]
-    scheme = spec.method
+def _scheme(record: Results, s: int, quantities: list[str]) -> Iterator[Cell]:
+    spec, scheme = record.experiment.schemes[s], record.experiment.schemes[s].method
     kinds = ["adaptive" if scheme.adaptive else "explicit" if scheme.explicit else "implicit"]
     kinds += ["s"] if scheme.symplectic else []
     name = spec.name if spec.name.startswith(spec.kind) else f"{spec.name} ({spec.kind})"
     yield from (name, scheme.family, ", ".join(kinds))
     yield None if scheme.adaptive else scheme.force_evaluations
-    limit = _common(optional(record, "stability_limit", MEMBER)[s])
+    limit = _common(record.optional("stability_limit", MEMBER)[s])
     if isinstance(limit, float):
         limit = Written(limit, LIMITS.get(limit, words.number(limit, "step")))
     yield limit
     for quantity in quantities:
-        formal = data.formal_orders(record, quantity)[s]
-        value, low, high = (part[s] for part in data.stated_orders(record, quantity))
+        formal = record.formal_orders(quantity)[s]
+        value, low, high = (part[s] for part in record.stated_orders(quantity))
         with np.errstate(invalid="ignore"):
             away = np.abs(value - formal)
         case = int(np.argmax(np.where(np.isfinite(away), away, -1.0)))
         yield _common(formal)
-        if whole(record, "triple"):
+        if record.triples:
             order, *ends = (float(part[case]) for part in (value, low, high))
             yield Written(order, words.with_interval(order, ends))
 
@@ -94,12 +89,12 @@ def _common(values: Floats) -> Cell:
     return float(distinct[0]) if distinct.size else None
 
 
-def predictions(record: Record) -> list[Table]:
+def predictions(record: Results) -> list[Table]:
     """Return the predicted and measured growth, and frequency and phase error, of every scheme, member and level."""
     if not predicted(record):
         return []
-    time = data.time_unit(record)
-    rate = data.unit(record, "theory_frequency") or f"rad/{time}"
+    time = record.time_unit
+    rate = record.unit("theory_frequency") or f"rad/{time}"
     by_peaks = record.variable("measured_growth").attrs.get("method") == PEAKS
     method = (
         "The measured numbers come from peaks interpolated by a parabola, which adds an error on coarse levels"
@@ -117,10 +112,10 @@ def predictions(record: Record) -> list[Table]:
 
 
 def _predictions(
-    record: Record, stem: str, caption: str, shown: dict[str, tuple[str, str]]
+    record: Results, stem: str, caption: str, shown: dict[str, tuple[str, str]]
 ) -> Table:
-    p, limit = data.omega_dt(record), optional(record, "stability_limit", MEMBER)
-    rate = np.abs(optional(record, "theory_frequency", OF_LEVEL))
+    p, limit = record.omega_dt, record.optional("stability_limit", MEMBER)
+    rate = np.abs(record.optional("theory_frequency", OF_LEVEL))
     with np.errstate(divide="ignore", invalid="ignore"):
         step = np.where(p > 0.0, math.ulp(1.0) * ROUNDINGS * 2.0 * math.pi / p, 0.0)
         sizes = {"frequency": rate, "phase_error": np.where(rate > 0.0, 2.0 * math.pi / rate, 1.0)}
@@ -134,7 +129,7 @@ def _predictions(
     ]
     for kind, (text, measure) in shown.items():
         from_theory, measured = (
-            optional(record, f"{origin}_{kind}", OF_LEVEL) for origin in ("theory", "measured")
+            record.optional(f"{origin}_{kind}", OF_LEVEL) for origin in ("theory", "measured")
         )
         noise = step * sizes.get(kind, np.fmax(np.abs(from_theory), 1.0))
         less = float(kind == "growth")
@@ -147,8 +142,8 @@ def _predictions(
             ),
         ]
     caption = f"Theory beside measurement: {caption}"
-    included, name = np.isfinite(optional(record, "theory_growth", OF_LEVEL)), f"theory_{stem}"
-    table = by_level(record, name, caption, data.all_members(record), filled, included=included)
+    included, name = np.isfinite(record.optional("theory_growth", OF_LEVEL)), f"theory_{stem}"
+    table = by_level(record, name, caption, record.all_members, filled, included=included)
     short = table.without_empty(["difference"])
     agree = ". Where no difference is shown, the two agree to round-off"
     return short if short.columns == table.columns else replace(short, caption=caption + agree)

@@ -7,10 +7,10 @@ from typing import Any
 from vibsim.checks import accurate
 from vibsim.checks.value_text import rule, what, what_of_all
 from vibsim.checks.verdict_text import expectation, expected_verdict
-from vibsim.core.record import Record
 from vibsim.core.vocabulary import TYPICAL_NORM
 from vibsim.experiment.value_names import CASES, IN_WORDS
-from vibsim.report import data, words
+from vibsim.report import words
+from vibsim.report.data import Results
 from vibsim.report.text.reasons import OUTCOMES
 from vibsim.report.types import Check, Experiment, Measurement
 
@@ -32,7 +32,7 @@ SOLUTIONS = {"exact": "the exact solution", "discrete": "the exact solution of i
 OF_TOLERANCE = "Error of the extrapolated solution, in the unit of each state, at every stored time"
 
 
-def about(check: Check | None, record: Record | None = None) -> str:
+def about(check: Check | None, record: Results | None = None) -> str:
     """Return the subject of a check in one line: its claim or what it measures; without a check, the tolerance."""
     if check is None:
         return OF_TOLERANCE
@@ -65,7 +65,7 @@ def wanted(
     return f"order {order} ± {check.tolerance:g}{', promised' * (check.order == 'scheme')}"
 
 
-def source(check: Check | None, record: Record | None = None) -> str:
+def source(check: Check | None, record: Results | None = None) -> str:
     """Return the source of a claim and what measures it; empty for other kinds of checks."""
     if check is None or check.kind != "claim":
         return ""
@@ -73,7 +73,7 @@ def source(check: Check | None, record: Record | None = None) -> str:
     return f"{origin}Measured by: {measured(check.that, record)}."
 
 
-def measured(check: Measurement, record: Record | None = None) -> str:
+def measured(check: Measurement, record: Results | None = None) -> str:
     """Say what a check measures and expects."""
     match check.kind:
         case "converges":
@@ -114,7 +114,7 @@ def measured(check: Measurement, record: Record | None = None) -> str:
             return f"{letter} by {check.first} equals that of {partner} to {within}{_where(check, record)}"
 
 
-def subject(check: Measurement, record: Record | None = None) -> str:
+def subject(check: Measurement, record: Results | None = None) -> str:
     """Say what a check measures, and where; of a number or a difference without its expected value."""
     if check.kind == "equal":
         return f"{words.title(check.quantity)} by {check.first}{_where(check, record)}"
@@ -132,7 +132,7 @@ def subject(check: Measurement, record: Record | None = None) -> str:
     return statement.replace("level best", "the limit of the levels")
 
 
-def _where(check: Measurement, record: Record | None = None, norm: str = TYPICAL_NORM) -> str:
+def _where(check: Measurement, record: Results | None = None, norm: str = TYPICAL_NORM) -> str:
     """Write in brackets the norm, unless it is the typical one, and the schemes, level and members of a check."""
     names = getattr(check, "schemes", None)
     parts = [] if norm == TYPICAL_NORM else [words.NORMS[norm]]
@@ -143,19 +143,19 @@ def _where(check: Measurement, record: Record | None = None, norm: str = TYPICAL
     return f" ({words.swept(', '.join(parts))})" if parts else ""
 
 
-def _place(record: Record | None, key: str, value: Any) -> str:
+def _place(record: Results | None, key: str, value: Any) -> str:
     """Name a place where a number is taken: a member by its swept values, if these are known."""
-    case = data.case_position(record, value) if record is not None and key == "case" else None
+    case = record.case_position(value) if record is not None and key == "case" else None
     if record is None or case is None:
         return f"{key} {value}"
-    return data.case_name(record, case)
+    return record.case_name(case)
 
 
-def swept_values(check: Measurement, record: Record | None = None) -> list[str]:
+def swept_values(check: Measurement, record: Results | None = None) -> list[str]:
     """Return the swept values that select the members of a check, as ``key = value`` with units that a record has."""
     units = {}
     if record is not None:
-        units = dict(data.swept_label(record, name) for name in data.swept(record))
+        units = dict(record.swept_label(name) for name in record.swept)
     return [
         f"{key} = {value if isinstance(value, str) else words.number(value, 'step')} {units.get(key, '')}".rstrip()
         for key, value in check.swept.items()

@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Collection, Mapping, Sequence
-from typing import Any
+from collections.abc import Collection
 
 import numpy as np
 
@@ -15,13 +14,11 @@ from vibsim.checks.order_sentences import UNSEEN
 from vibsim.checks.outcome import Result, about_members
 from vibsim.checks.verdict_text import Wording
 from vibsim.convergence import LadderVerdict
-from vibsim.core.record import Record
 from vibsim.core.vocabulary import plain_name
-from vibsim.report import data, words
-from vibsim.report.choice import Lead, is_refutation, is_trap
-from vibsim.report.series import name_of_exact
+from vibsim.models import Model
+from vibsim.report import words
+from vibsim.report.choice import CheckedLadder, is_trap
 from vibsim.report.text import assertions, reasons
-from vibsim.report.types import Experiment, Measurement
 
 ORDINALS = {1: "first", 2: "second", 3: "third", 4: "fourth", 5: "fifth", 6: "sixth", 8: "eighth"}
 NUMERALS = dict(enumerate(("three", "four", "five", "six", "seven", "eight", "nine"), 3))
@@ -102,48 +99,42 @@ ROUGH = "The rescaled differences of the levels do not coincide yet, so the esti
 BESIDE = " The estimate is within {part} % of the error against the {name} solution."
 
 
-def title(experiment: Experiment, record: Record, lead: Lead, printed: Collection[str]) -> str:
+def title(lead: CheckedLadder, printed: Collection[str]) -> str:
     """Return the finding of an experiment in one line; `printed` are the ids of checks of printed numbers."""
     if lead.entry is None:
         return NO_CHECK
-    entry, finding = lead.entry, _claim_title(lead) or _check_title(experiment, record, lead)
-    if entry["status"] != "PASS":
+    entry, finding = lead.entry, _claim_title(lead) or _check_title(lead)
+    if lead.status != "PASS":
         against = ", against what the check expects" if _is_trap_of_a_number(lead) else ""
-        return f"{finding}{against}{_share_of_runs(record, lead)}"
+        return f"{finding}{against}{_share_of_runs(lead)}"
     if entry["id"] in printed:
-        count = len(printed)
-        return (
-            f"All {count} printed numbers are as expected"
-            if count > 1
-            else "The printed number is as expected"
-        )
-    checked = [check.value for check in experiment.checks if check.kind == "value"]
+        many = f"All {len(printed)} printed numbers are as expected"
+        return many if len(printed) > 1 else "The printed number is as expected"
+    checked = [check.value for check in lead.record.experiment.checks if check.kind == "value"]
     if len(checked) > 1 and lead.asserted is not None and lead.asserted.kind == "value":
         finding = f"All {len(checked)} numbers are as expected"
         if len(set(checked)) == 1:
             name = words.PAGE.value(checked[0])
             finding = f"{_capitalized(f'the {name}')} is as expected in all {len(checked)} checks"
-    return f"{finding}{_caught(experiment, lead)}"
+    return f"{finding}{_caught(lead)}"
 
 
-def _share_of_runs(record: Record, lead: Lead) -> str:
+def _share_of_runs(lead: CheckedLadder) -> str:
     """Say how many members or schemes have the verdict, by name if it is one scheme; empty if all have."""
     assert lead.entry is not None
-    counts = lead.entry["counts"]
-    count, total = counts[lead.entry["status"]], sum(counts.values())
-    if not 0 < count < total:
+    count = lead.entry["counts"][lead.status]
+    if not 0 < count < lead.total:
         return ""
-    if count == 1 and not data.swept(record):
+    if count == 1 and not lead.record.swept:
         return f", with {lead.result['scheme']}"
-    noun = "members" if len(record["scheme"]) == 1 else "runs"
-    noun = noun if data.swept(record) else "schemes"
-    part, whole = (words.number(n, "integer") for n in (count, total))
+    noun = "members" if len(lead.record.schemes) == 1 else "runs"
+    noun = noun if lead.record.swept else "schemes"
+    part, whole = (words.number(n, "integer") for n in (count, lead.total))
     return f", in {part} of {whole} {noun}"
 
 
-def _claim_title(lead: Lead) -> str:
+def _claim_title(lead: CheckedLadder) -> str:
     """Return the title of a page on a claim: the claim and whether it holds; empty for other checks."""
-    assert lead.entry is not None
     check = lead.asserted
     if check is None or check.kind != "claim":
         return ""
@@ -151,36 +142,35 @@ def _claim_title(lead: Lead) -> str:
     if _FORMULA.match(claim) is None:
         claim = words.capitalized(claim)
     claim = claim if len(claim) <= LONG_CLAIM else f"{claim[: LONG_CLAIM - 1]}…"
-    status = lead.entry["status"]
-    is_false = not check.holds and status != "INCONCLUSIVE"
-    return f"{CLAIMS[status, is_false]}{claim}"
+    is_false = not check.holds and lead.status != "INCONCLUSIVE"
+    return f"{CLAIMS[lead.status, is_false]}{claim}"
 
 
-def _is_trap_of_a_number(lead: Lead) -> bool:
+def _is_trap_of_a_number(lead: CheckedLadder) -> bool:
     """Return whether the check is a trap on something other than an order or a claim."""
     check = lead.asserted
-    return check is not None and check.kind not in ("claim", "converges") and is_trap(check)
+    return lead.is_trap and check is not None and check.kind not in ("claim", "converges")
 
 
-def _caught(experiment: Experiment, lead: Lead) -> str:
+def _caught(lead: CheckedLadder) -> str:
     """Say that traps were caught; empty if the experiment has none."""
-    traps = [check for check in experiment.checks if check.kind != "claim" and is_trap(check)]
+    checks = lead.record.experiment.checks
+    traps = [check for check in checks if check.kind != "claim" and is_trap(check)]
     if not traps:
         return ""
-    if is_trap(lead.asserted):
+    if lead.is_trap:
         return ": the trap is caught"
     return f", and {'the trap is' if len(traps) == 1 else f'{len(traps)} traps are'} caught"
 
 
-def _check_title(experiment: Experiment, record: Record, lead: Lead) -> str:
+def _check_title(lead: CheckedLadder) -> str:
     """Return the title of a page on the decisive check."""
     assert lead.entry is not None
-    status, reason = lead.entry["status"], lead.entry["reason"]
-    kind = lead.measured.kind if lead.measured else "tolerance"
-    filled = _phrases(experiment, record, lead)
-    if kind == "converges":
+    status, reason = lead.status, lead.reason
+    filled = _phrases(lead)
+    if lead.is_on_order:
         # the outcome of a trap says more than that it was expected
-        word = lead.result["reason"] if reason == "match" else reason
+        word = str(lead.result["reason"] if reason == "match" else reason)
         if word == "exact" and any(result["reason"] != "exact" for result in lead.entry["results"]):
             # some schemes are exact, as they promise; the others have an order
             word = "asymptotic"
@@ -191,16 +181,16 @@ def _check_title(experiment: Experiment, record: Record, lead: Lead) -> str:
         # the outcome says more than that it was expected
         status = lead.result.get("status", status)
     table = {"PASS": MATCHED, "FAIL": MISSED}.get(status, OPEN)
-    return table[kind].format_map(filled)
+    return table[lead.kind].format_map(filled)
 
 
-def _phrases(experiment: Experiment, record: Record, lead: Lead) -> dict[str, str]:
+def _phrases(lead: CheckedLadder) -> dict[str, str]:
     """Return the words that fill the template of a title."""
-    measured, what = lead.measured, _in_words(experiment, lead.quantity)
+    measured, what = lead.measured, _in_words(lead.record.model, lead.quantity)
     order, expected = lead.facts.get("order"), lead.facts.get("promised")
-    judged = _named_schemes(record, lead)
+    judged = lead.schemes
     filled = {
-        "what": what, "What": _capitalized(what), "everywhere": _everywhere(record, lead),
+        "what": what, "What": _capitalized(what), "everywhere": _everywhere(lead),
         "converges": "tends to zero" if plain_name(lead.quantity) == "energy_deviation" else "converges",
         "at": _at(expected, order), **_contrast(order, expected),
         "Schemes": f"Scheme {judged[0]}" if len(judged) == 1 else "The schemes",
@@ -210,7 +200,7 @@ def _phrases(experiment: Experiment, record: Record, lead: Lead) -> dict[str, st
         return filled
     match measured.kind:
         case "value":
-            subject = assertions.subject(measured, record)
+            subject = assertions.subject(measured, lead.record)
             filled |= {"subject": subject, "Subject": _capitalized(words.PAGE.opening(subject))}
         case "equal":
             second = assertions.SOLUTIONS.get(measured.second, f"that by {measured.second}")
@@ -223,7 +213,7 @@ def _phrases(experiment: Experiment, record: Record, lead: Lead) -> dict[str, st
                 outcomes = ["are stable", "make the amplitude grow"]
             expected, opposite = outcomes if measured.stable else outcomes[::-1]
             filled |= {"stability": expected, "not_stability": f"{opposite}, against what is asked"}
-    if _has_several_orders(record, lead):
+    if _has_several_orders(lead):
         filled["at"] = "at the order that its scheme promises"
         if (count := len(judged)) > 1:
             schemes = "both schemes promise" if count == 2 else f"each of {count} schemes promises"
@@ -231,19 +221,13 @@ def _phrases(experiment: Experiment, record: Record, lead: Lead) -> dict[str, st
     return filled
 
 
-def _named_schemes(record: Record, lead: Lead) -> Sequence[str]:
-    """Return the schemes that the decisive check judges."""
-    return getattr(lead.measured, "schemes", None) or record.words("scheme")
-
-
-def _has_several_orders(record: Record, lead: Lead) -> bool:
+def _has_several_orders(lead: CheckedLadder) -> bool:
     """Return whether a check expects the scheme's order and this differs between its schemes or members."""
     is_formal = getattr(lead.measured, "order", None) == "scheme"
-    if not is_formal or f"{lead.quantity}_formal_order" not in record:
+    if not is_formal or "formal_order" not in lead:
         return False
-    schemes = record.words("scheme")
-    positions = [schemes.index(scheme) for scheme in _named_schemes(record, lead)]
-    return len(set(data.formal_orders(record, lead.quantity)[positions].flat)) > 1
+    positions = [lead.record.schemes.index(scheme) for scheme in lead.schemes]
+    return len(set(lead.record.formal_orders(lead.quantity)[positions].flat)) > 1
 
 
 def _contrast(order: float | None, expected: float | None) -> dict[str, str]:
@@ -256,9 +240,8 @@ def _contrast(order: float | None, expected: float | None) -> dict[str, str]:
     return {"at_measured": measured, "expected_order": wanted}
 
 
-def _in_words(experiment: Experiment, quantity: str) -> str:
+def _in_words(model: Model, quantity: str) -> str:
     """Return a quantity in words; in those of the model if it has no letter of its own."""
-    model = experiment.model.definition
     long_names = {state.name: state.long_name for state in model.states}
     long_names |= {output.name: output.long_name for output in model.outputs}
     if quantity in words.NAMES or quantity not in long_names:
@@ -266,33 +249,27 @@ def _in_words(experiment: Experiment, quantity: str) -> str:
     return f"the {long_names[quantity]}{'' if words.is_phrase(quantity) else f' {quantity}'}"
 
 
-def short(experiment: Experiment, quantity: str) -> str:
+def short(model: Model, quantity: str) -> str:
     """Return the letter of a quantity, or its words if its name is a phrase."""
     is_phrase = words.is_phrase(quantity)
-    return _in_words(experiment, quantity) if is_phrase else words.symbol(quantity)
+    return _in_words(model, quantity) if is_phrase else words.symbol(quantity)
 
 
-def _everywhere(record: Record, lead: Lead) -> str:
+def _everywhere(lead: CheckedLadder) -> str:
     """Say for which members and schemes the finding holds; empty for one result of the only scheme."""
-    assert lead.entry is not None
-    total, schemes = sum(lead.entry["counts"].values()), record.words("scheme")
-    judged = _named_schemes(record, lead)
-    kind = lead.measured.kind if lead.measured else ""
-    is_named = kind in ("converges", "accurate") and len(judged) == 1 < len(schemes)
-    by = f" with scheme {judged[0]}" if is_named else ""
-    members = len(record["case"])
-    is_of_one = total < 2 and (members < 2 or kind not in ("converges", "accurate"))
-    if is_of_one:
+    total, schemes, members = lead.total, lead.record.schemes, lead.record.count
+    is_on_error = lead.kind in ("converges", "accurate")
+    is_named = is_on_error and len(lead.schemes) == 1 < len(schemes)
+    by = f" with scheme {lead.schemes[0]}" if is_named else ""
+    if total < 2 and (members < 2 or not is_on_error):
         return by
-    if data.swept(record):
+    if lead.record.swept:
         count = {1: "the", 2: "both"}.get(total, f"all {words.number(total, 'integer')}")
         noun = "runs" if total > members else "members" if total > 1 else "member"
-        values = assertions.swept_values(lead.measured, record) if lead.measured else []
+        values = assertions.swept_values(lead.measured, lead.record) if lead.measured else []
         subset = f"with {words.swept(', '.join(values))}" if values else "asked about"
-        subset = (
-            f" {subset}, of {words.number(members, 'integer')} in all" if total < members else ""
-        )
-        return f" in {count} {noun}{subset}{by}"
+        of = f" {subset}, of {words.number(members, 'integer')} in all" * (total < members)
+        return f" in {count} {noun}{of}{by}"
     if total == len(schemes) == 2:
         return " with both schemes"
     count = NUMERALS.get(len(schemes), str(len(schemes)))
@@ -326,66 +303,60 @@ def of_ladder(verdict: LadderVerdict) -> str:
     return ON_ORDER[verdict.reason].format_map(filled)
 
 
-def factor(lead: Lead) -> float | None:
+def factor(lead: CheckedLadder) -> float | None:
     """Return the factor by which halving the step divides the error; None without a settled order that decides."""
-    if lead.entry is None or not lead.is_on_order or lead.entry["status"] == "INCONCLUSIVE":
+    if lead.entry is None or not lead.is_on_order or lead.status == "INCONCLUSIVE":
         return None
     order = words.fact(lead.result, "order")
     is_settled = lead.result["reason"] in WITH_AN_ORDER and order is not None
     return 2.0**order if is_settled else None
 
 
-def paragraph(experiment: Experiment, record: Record, lead: Lead, levels: int) -> str:
+def paragraph(lead: CheckedLadder) -> str:
     """Return what the finding means, for a first-time reader."""
+    record = lead.record
     if lead.entry is None:
-        return NOTHING_ASKED.format(position=experiment.model.definition.position)
-    ratio, is_passed = factor(lead), lead.entry["status"] == "PASS"
+        return NOTHING_ASKED.format(position=record.model.position)
+    ratio, is_passed = factor(lead), lead.status == "PASS"
     if ratio is not None and is_passed and lead.result["reason"] == "asymptotic":
-        deviation = _estimate_deviation(record, lead)
-        distance = data.coincidence(record, lead.quantity, lead.member)
-        is_rough = distance > COINCIDE or (deviation is not None and deviation > COINCIDE)
-        percent = "" if deviation is None else words.number(max(100.0 * deviation, 0.1), "brief")
+        deviation, beside, unseen = _estimate_deviation(lead), "", UNSEEN
+        if deviation is not None:
+            percent = words.number(max(100.0 * deviation, 0.1), "brief")
+            beside, unseen = BESIDE.format(part=percent, name=record.name_of_exact), ""
+        is_rough = lead.coincidence > COINCIDE or (deviation or 0.0) > COINCIDE
         order = words.fact(lead.result, "promised")
         due = f" (order {order:g} predicts {2.0**order:.3g})" if order else ""
+        trust = ROUGH if is_rough else TRUSTED
         return CONVERGES.format(
-            factor=f"{ratio:.3g}",
-            due=due,
-            trust=ROUGH if is_rough else TRUSTED,
-            beside=""
-            if deviation is None
-            else BESIDE.format(part=percent, name=name_of_exact(experiment)),
-            unseen=UNSEEN if deviation is None else "",
+            factor=f"{ratio:.3g}", due=due, trust=trust, beside=beside, unseen=unseen
         )
-    if is_refutation(lead.asserted) and lead.entry["reason"] == "match":
+    if lead.is_refutation and lead.reason == "match":
         return reasons.REFUTED
-    kind = lead.measured.kind if lead.measured else lead.entry["kind"]
-    if kind == "value" and lead.entry["reason"] == "match":
+    if lead.kind == "value" and lead.reason == "match":
         # the number stands above, with what is asked for
         return ""
-    word = lead.result.get("reason") if lead.is_on_order else lead.entry["reason"]
-    if word == "mismatch" and kind in KINDS:
+    word = lead.result.get("reason") if lead.is_on_order else lead.reason
+    if word == "mismatch" and lead.kind in KINDS:
         # what was found says more than that it is not as expected
-        wording = Wording(experiment, record, lead.asserted, words.PAGE)
+        wording = Wording(record.experiment, record, lead.asserted, words.PAGE)
         return words.swept(wording.sentence(Result.of(lead.result)))
-    is_promised = keeps_promise(record, lead.measured, lead.entry)
-    meaning = reasons.reason(word, kind, levels=levels, is_promised=is_promised).meaning
-    return meaning + (_growing_error(record, lead) if word == "round_off" else "")
+    meaning = explained(lead, word).meaning
+    return meaning + (_growing_error(lead) if word == "round_off" else "")
 
 
-def _growing_error(record: Record, lead: Lead) -> str:
+def _growing_error(lead: CheckedLadder) -> str:
     """Say from which level on finer ones have a larger true error; empty if none do, or it is unknown."""
-    name = f"{lead.quantity}_error_norm"
-    error = data.at(record, name, lead.member, lead.norm) if name in record else np.empty(0)
+    error = lead.at("error_norm", lead.norm) if "error_norm" in lead else np.empty(0)
     if not error.size or not np.isfinite(error).all() or not 0.0 < GROWN * error.min() <= error[-1]:
         return ""
-    level = data.whole(record, "level")[int(np.argmin(error))]
+    level = lead.record.levels[int(np.argmin(error))]
     times = words.number(float(error[-1] / error.min()), "brief")
     return f" The error is smallest at level {level}; at the finest level it is {times} times as large."
 
 
-def asked_of(record: Record, lead: Lead) -> str:
+def asked_of(lead: CheckedLadder) -> str:
     """Say of how many members a check asks for an order, where others are not judged; else nothing."""
-    asked, every = int(about_members(record, lead.measured).sum()), len(record["case"])
+    asked, every = int(about_members(lead.record, lead.measured).sum()), lead.record.count
     if not lead.is_on_order or asked == every:
         return ""
     few, all_of, rest = (words.number(n, "integer") for n in (asked, every, every - asked))
@@ -394,26 +365,29 @@ def asked_of(record: Record, lead: Lead) -> str:
     )
 
 
-def keeps_promise(record: Record, measured: Measurement | None, check: Mapping[str, Any]) -> bool:
+def explained(lead: CheckedLadder, word: str | None) -> reasons.Reason:
+    """Return the explanation of a reason of a check."""
+    check = lead.measured
+    value = check.value if check is not None and check.kind == "value" else ""
+    levels = len(lead.record.levels)
+    return reasons.reason(word, lead.kind, value, levels, _keeps_promise(lead))
+
+
+def _keeps_promise(lead: CheckedLadder) -> bool:
     """Return whether the decisive result has the order of its scheme although the check states an order of its own."""
-    decisive = check["results"][0]
-    order, member = words.fact(decisive, "order"), data.of_result(record, decisive)
-    if measured is None or measured.kind != "converges" or measured.order == "scheme":
+    check, order = lead.measured, words.fact(lead.result, "order")
+    if check is None or check.kind != "converges" or check.order == "scheme" or order is None:
         return False
-    if order is None:
-        return False
-    formal = data.formal_order(record, member, measured.converges)
-    is_promised = data.basis_of_order(record, measured.converges) == "promised"
-    return bool(is_promised and abs(formal - order) <= measured.tolerance)
+    is_promised = lead.basis_of_order == "promised"
+    return bool(is_promised and abs(lead.formal_order - order) <= check.tolerance)
 
 
-def _estimate_deviation(record: Record, lead: Lead) -> float | None:
+def _estimate_deviation(lead: CheckedLadder) -> float | None:
     """Return the relative deviation of the estimated error of the finest level from the true one; None if unknown."""
     from vibsim.report import finest_level
 
-    error = finest_level.error(record, lead.quantity)
-    position = lead.member.scheme, lead.member.case
-    true, estimate = float(error.true[position]), float(error.estimate[position])
+    error = finest_level.error(lead.record, lead.quantity)
+    true, estimate = (float(part[lead.member.place]) for part in (error.true, error.estimate))
     if not (math.isfinite(true) and math.isfinite(estimate) and true > 0.0):
         return None
     return abs(estimate / true - 1.0)

@@ -7,12 +7,12 @@ from typing import Any
 
 import numpy as np
 
-from vibsim.core.record import Record
 from vibsim.core.set_option import set_options
 from vibsim.core.vocabulary import HIGHEST
 from vibsim.report import data, words
+from vibsim.report.data import Results
 from vibsim.report.text import structure
-from vibsim.report.types import Axis, Experiment, SchemeSpec
+from vibsim.report.types import Axis, SchemeSpec
 
 LISTED = 8  # most values of a key in a list
 MOST_LISTED = 16  # parameters or initial values in a list
@@ -25,9 +25,9 @@ def not_in_file(settings: Sequence[str]) -> Iterator[tuple[str, str]]:
         yield "Not as in the file", f"the run had{set_options(settings)}"
 
 
-def setup(experiment: Experiment, record: Record) -> Iterator[tuple[str, str]]:
+def setup(record: Results) -> Iterator[tuple[str, str]]:
     """Yield the setup of a run as pairs of term and text."""
-    model = experiment.model.definition
+    experiment, model = record.experiment, record.model
     axes = experiment.sweep.axes if experiment.sweep else ()
     keys = {key for axis in axes for key in axis.keys}
     sizes = {p.key: data.pretty_unit(p.unit) for p in model.parameters}
@@ -57,7 +57,7 @@ def setup(experiment: Experiment, record: Record) -> Iterator[tuple[str, str]]:
         sizes, units = {}, {}
     yield "Parameters", _listing("model", experiment.model.parameters, sizes, keys, letters)
     yield "Initial values", _listing("initial", experiment.initial, units, keys)
-    yield from _times(experiment, record)
+    yield from _times(record)
     if experiment.tolerance is not None:
         bound = words.number(experiment.tolerance, "step")
         yield "Tolerance", f"the levels were chosen so that the error bound reaches {bound}"
@@ -65,7 +65,7 @@ def setup(experiment: Experiment, record: Record) -> Iterator[tuple[str, str]]:
         yield "Output", "best.nc: the solution extrapolated over the levels, with its error bound"
     yield "Schemes", "; ".join(_scheme(spec, keys) for spec in experiment.schemes)
     if axes:
-        count = words.number(len(record["case"]), "integer")
+        count = words.number(record.count, "integer")
         yield "Sweep", f"{count} members. {'; '.join(map(_axis, axes))}"
     if experiment.sweep is not None and experiment.sweep.follow:
         last = f"the last state of the one before along {experiment.sweep.follow}"
@@ -84,10 +84,10 @@ def _scheme(spec: SchemeSpec, swept: set[str]) -> str:
     return f"{name} ({', '.join(options)})" if options else name
 
 
-def _times(experiment: Experiment, record: Record) -> Iterator[tuple[str, str]]:
-    levels, time = list(experiment.levels), data.time_unit(record, "dt")
-    counts = [words.number(float(experiment.steps(level)), "integer") for level in levels]
-    dt, ends = np.asarray(record["dt"], dtype=np.float64), data.ends_of(record)
+def _times(record: Results) -> Iterator[tuple[str, str]]:
+    levels, time = list(record.experiment.levels), record.time_unit
+    counts = [words.number(float(record.experiment.steps(level)), "integer") for level in levels]
+    dt, ends = np.asarray(record["dt"], dtype=np.float64), record.ends
     extent = [words.number(x, "step") for x in sorted({float(ends.min()), float(ends.max())})]
     differs = " (differs between members)" if "end" in record else ""
     yield "Time", f"0 to {' … '.join(extent)} {time}{differs}"

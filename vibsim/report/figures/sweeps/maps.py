@@ -8,17 +8,16 @@ from typing import Any
 
 import numpy as np
 
-from vibsim.checks.number_units import unit_of
 from vibsim.core.array_types import Floats
-from vibsim.core.record import Record
 from vibsim.core.vocabulary import REASONS, SEVERITY
-from vibsim.report import data, finest_level, style, words
-from vibsim.report.choice import position, tolerance
+from vibsim.report import finest_level, style, words
+from vibsim.report.choice import tolerance
+from vibsim.report.data import Results
 from vibsim.report.figures.sweeps import view
 from vibsim.report.figures.sweeps.view import View, Worst
 from vibsim.report.style import Picture
 from vibsim.report.sweep_layout import Grid
-from vibsim.report.types import Axes, Experiment, Figure
+from vibsim.report.types import Axes, Figure
 
 LEFT, WIDE, TALL, ABOVE, BELOW = 0.8, 5.4, 3.4, 0.32, 0.5
 """Left margin, width and height of a map, room above and below it [inch]."""
@@ -56,12 +55,12 @@ class Map:
 
 
 def views(
-    experiment: Experiment, record: Record, grid: Grid, quantities: list[str], worst: Worst, schemes: range
+    record: Results, grid: Grid, quantities: list[str], worst: Worst, schemes: range
 ) -> Iterator[View | str]:  # fmt: skip
     """Yield a map of each number of each scheme, or a sentence if all members share it."""
     for scheme in schemes:
-        several = data.of_several(record, scheme)
-        for shown in _maps(experiment, record, quantities, scheme):
+        several = record.of_several(scheme)
+        for shown in _maps(record, quantities, scheme):
             text = shown.shared
             if text is None:
                 text = view.shared(shown.name, shown.values, shown.unit)
@@ -71,25 +70,25 @@ def views(
                 yield _view(record, grid, shown, scheme, worst(shown.quantity).case)
 
 
-def _maps(experiment: Experiment, record: Record, names: list[str], scheme: int) -> Iterator[Map]:
+def _maps(record: Results, names: list[str], scheme: int) -> Iterator[Map]:
     """Yield the maps of a scheme: of the motion (a conservative one by its period first) and of each quantity."""
     both = [_period, _amplitude]
-    for draw_motion in both if experiment.model.definition.conservative else both[::-1]:
-        yield from draw_motion(position(experiment), record, scheme)
+    for draw_motion in both if record.model.conservative else both[::-1]:
+        yield from draw_motion(record, scheme)
     for quantity in names:
-        yield from _order(experiment, record, quantity, scheme)
+        yield from _order(record, quantity, scheme)
         yield from _errors(record, quantity, scheme)
-    for name, text, check in view.value_checks(experiment):
-        values = view.of_check(record, name, check)[scheme]
-        unit = data.pretty_unit(unit_of(experiment, record, check))
+    for name, text, check in view.value_checks(record):
+        values, unit = view.of_check(record, name, check)[scheme], record.unit_of_number(check)
         yield Map(
-            f"check_{name}", text, position(experiment), values, style.label(text, unit), unit,
+            f"check_{name}", text, record.model.position, values, style.label(text, unit), unit,
             caption="The number that a check asks for.",
         )  # fmt: skip
 
 
-def _period(quantity: str, record: Record, scheme: int) -> Iterator[Map]:
-    time, exact = finest_level.measured(record, "period", quantity), data.exact_periods(record)
+def _period(record: Results, scheme: int) -> Iterator[Map]:
+    time, exact = finest_level.measured(record, "period"), record.exact_periods
+    quantity = record.model.position
     value, exact = time.value[scheme], np.where(np.isfinite(exact), exact, np.nan)
     if not np.isfinite(value).any():
         return
@@ -108,12 +107,12 @@ def _period(quantity: str, record: Record, scheme: int) -> Iterator[Map]:
     yield Map("period_exact", "exact period", quantity, exact, label, time.unit, spread=spread)
 
 
-def _finest_level(record: Record) -> str:
-    return f"Of level {data.whole(record, 'level')[-1]}."
+def _finest_level(record: Results) -> str:
+    return f"Of level {record.levels[-1]}."
 
 
-def _amplitude(quantity: str, record: Record, scheme: int) -> Iterator[Map]:
-    size = finest_level.measured(record, "amplitude", quantity)
+def _amplitude(record: Results, scheme: int) -> Iterator[Map]:
+    size, quantity = finest_level.measured(record, "amplitude"), record.model.position
     value, bar = size.value[scheme], size.error[scheme]
     if not np.isfinite(value).any():
         return
@@ -123,31 +122,31 @@ def _amplitude(quantity: str, record: Record, scheme: int) -> Iterator[Map]:
     yield Map("amplitude_bar", "error bar of the amplitude", quantity, bar, text, size.unit)
 
 
-def _order(experiment: Experiment, record: Record, quantity: str, scheme: int) -> Iterator[Map]:
+def _order(record: Results, quantity: str, scheme: int) -> Iterator[Map]:
     """Yield the verdict on a quantity, its order, and the width of the interval."""
     letter = words.symbol(quantity)
     if f"{quantity}_reason" in record:
         yield _reasons(record, quantity, scheme)
-    if not data.whole(record, "triple"):
+    if not record.triples:
         return
-    allowed = tolerance(experiment, quantity, record.words("scheme")[scheme])
-    order, low, high = (part[scheme] for part in data.stated_orders(record, quantity))
-    away = order - data.formal_orders(record, quantity)[scheme]
+    allowed = tolerance(record, quantity, record.schemes[scheme])
+    order, low, high = (part[scheme] for part in record.stated_orders(quantity))
+    away = order - record.formal_orders(quantity)[scheme]
     yield Map(
         f"{quantity}_order", f"order of {letter}", quantity, away,
-        f"order of {letter} − {data.promised_text(record, quantity, scheme)}", kind="distance",
+        f"order of {letter} − {record.promised_text(quantity, scheme)}", kind="distance",
         tolerance=allowed, number=order, shared=view.shared(f"order of {letter}", order, form="order"),
-        caption=f"Pale colours are orders within ± {allowed:g} of the {data.basis_of_order(record, quantity)} one, "
+        caption=f"Pale colours are orders within ± {allowed:g} of the {record.basis_of_order(quantity)} one, "
         "where the scale jumps.",
     )  # fmt: skip
     text = "width of the interval"
     yield Map(f"{quantity}_bar", f"error bar of the order of {letter}", quantity, high - low, text)
 
 
-def _errors(record: Record, quantity: str, scheme: int) -> Iterator[Map]:
+def _errors(record: Results, quantity: str, scheme: int) -> Iterator[Map]:
     """Yield the error of the finest level and the quality of its estimate."""
     error, letter = finest_level.error(record, quantity), words.symbol(quantity)
-    unit = data.norm_unit(record, quantity)
+    unit = record.norm_unit(quantity)
     text = style.label(f"{error.kind} error of {letter} ({words.USUAL_NORM})", unit)
     best, estimate = style.positive(error.best[scheme]), error.estimate[scheme]
     yield Map(
@@ -169,9 +168,9 @@ def _errors(record: Record, quantity: str, scheme: int) -> Iterator[Map]:
     yield Map(f"{quantity}_error_bar", name, quantity, width, "relative width")
 
 
-def _reasons(record: Record, quantity: str, scheme: int) -> Map:
+def _reasons(record: Results, quantity: str, scheme: int) -> Map:
     """Return the map of the reasons of the verdicts; a cell shows its worst member."""
-    reason = data.pick(record, f"{quantity}_reason", scheme=scheme)
+    reason = record.pick(f"{quantity}_reason", scheme=scheme)
     meanings = record.meanings(f"{quantity}_reason")
     found, counts = (part.tolist() for part in np.unique(reason, return_counts=True))
     named = [(code, meanings[code], count) for code, count in zip(found, counts, strict=True)]
@@ -188,13 +187,13 @@ def _reasons(record: Record, quantity: str, scheme: int) -> Map:
     )  # fmt: skip
 
 
-def _view(record: Record, grid: Grid, shown: Map, scheme: int, worst: int) -> View:
+def _view(record: Results, grid: Grid, shown: Map, scheme: int, worst: int) -> View:
     """Draw a map; the caption explains grey cells, dots and blocks, if there are any."""
     # of several members a cell shows the one that is farthest from 0, or from the factor 1
     size = np.log(shown.values) if shown.kind == "factor" else shown.values
     table = grid.worst(shown.values, np.abs(size))
     figure = draw(grid, shown, table)
-    ax, several = figure.axes[0], data.of_several(record, scheme)
+    ax, several = figure.axes[0], record.of_several(scheme)
     is_ringed = view.ring(ax, float(grid.x.values[worst]), float(grid.y.values[worst]), on_map=True)
     title = f"{words.capitalized(shown.name)}{several}"
     text = style.sentences(

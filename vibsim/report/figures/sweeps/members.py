@@ -12,16 +12,15 @@ from typing import Any
 import numpy as np
 
 from vibsim.core.array_types import Flags, Floats
-from vibsim.core.record import Record
 from vibsim.core.vocabulary import SEVERITY
-from vibsim.report import data, finest_level, style, words
+from vibsim.report import finest_level, style, words
 from vibsim.report.choice import tolerance
-from vibsim.report.data import bin_of, flags, norm_unit, of_several, promised_text, whole
+from vibsim.report.data import Results, bin_of
 from vibsim.report.figures.panels import rows_of
 from vibsim.report.figures.sweeps.view import View, Worst, key_axis, ring, shared
 from vibsim.report.style import Picture
 from vibsim.report.sweep_layout import Key, bins
-from vibsim.report.types import Axes, Experiment
+from vibsim.report.types import Axes
 from vibsim.report.words import power
 
 Masks = dict[str, Flags]
@@ -44,16 +43,14 @@ def _legend(ax: Axes, verdicts: list[str]) -> None:
 
 
 def views(
-    experiment: Experiment, record: Record, keys: list[Key], quantities: list[str], worst: Worst, schemes: range
+    record: Results, keys: list[Key], quantities: list[str], worst: Worst, schemes: range
 ) -> Iterator[View | str]:  # fmt: skip
     """Yield order and error of each quantity of each scheme against every swept key."""
     for scheme in schemes:
         for quantity in quantities:
             if f"{quantity}_status" in record:
                 draw = _Projection(record, keys, quantity, scheme, worst(quantity).case)
-                yield from draw.order(
-                    tolerance(experiment, quantity, record.words("scheme")[scheme])
-                )
+                yield from draw.order(tolerance(record, quantity, record.schemes[scheme]))
                 yield from draw.error()
 
 
@@ -61,7 +58,7 @@ def views(
 class _Projection:
     """Views of a quantity of one scheme against every swept key."""
 
-    record: Record
+    record: Results
     keys: list[Key]
     quantity: str
     scheme: int
@@ -70,29 +67,29 @@ class _Projection:
     @property
     def masks(self) -> Masks:
         """The members with each status."""
-        status = flags(self.record, f"{self.quantity}_status")[self.scheme]
+        status = self.record.flags(f"{self.quantity}_status")[self.scheme]
         return {word: status == word for word in SEVERITY}
 
     def order(self, allowed: float) -> Iterator[View | str]:
         """Yield the order, stated or estimated, minus the formal one."""
         record, quantity = self.record, self.quantity
         name = f"order of {words.symbol(quantity)}"
-        order = data.orders(record, quantity)[0][self.scheme]
+        order = record.orders(quantity)[0][self.scheme]
         away = finest_level.deviation(record, quantity)[self.scheme]
         if not np.isfinite(away).any():
             return
         if text := shared(name, order, form="order"):
-            yield f"{text}{of_several(record, self.scheme)}"
+            yield f"{text}{record.of_several(self.scheme)}"
             return
 
         def draw(ax: Axes, key: Key) -> None:
             ax.axhspan(-allowed, allowed, **style.ALLOWED)
             _draw_members(ax, key, away, self.masks, (-ORDER_FRAME, ORDER_FRAME))
 
-        label = f"{name} − {promised_text(record, quantity, self.scheme)}"
+        label = f"{name} − {record.promised_text(quantity, self.scheme)}"
         edge_note = "Orders beyond the frame are drawn at its edge, members without an order at the lower edge."
         leaves = not np.all(np.abs(away) < ORDER_FRAME)
-        band = f"Grey: the tolerance around the {data.basis_of_order(record, quantity)} order."
+        band = f"Grey: the tolerance around the {record.basis_of_order(quantity)} order."
         places = np.clip(np.nan_to_num(away, nan=-ORDER_FRAME), -ORDER_FRAME, ORDER_FRAME)
         explanation = style.sentences(band, edge_note * leaves)
         yield self._view("order", name, label, draw, explanation, order, places)
@@ -103,7 +100,7 @@ class _Projection:
 
         error = finest_level.error(self.record, self.quantity)
         best = error.best[self.scheme]
-        unit = norm_unit(self.record, self.quantity)
+        unit = self.record.norm_unit(self.quantity)
         name = f"error of {words.symbol(self.quantity)}"
         size = np.log10(style.positive(best))
         if not np.isfinite(size).any():
@@ -115,7 +112,7 @@ class _Projection:
             ax.yaxis.set_major_locator(MaxNLocator(5, integer=True))
             ax.yaxis.set_major_formatter(FuncFormatter(lambda y, _: power(round(y))))
 
-        explanation = f"Of level {whole(self.record, 'level')[-1]}."
+        explanation = f"Of level {self.record.levels[-1]}."
         label = style.label(f"{error.kind} {name}", unit)
         yield self._view("error", name, label, draw, explanation, best, size, unit)
 
@@ -137,12 +134,12 @@ class _Projection:
                 ax.set_ylabel(label, fontsize=8.5)
             ax.set_gid(style.MEMBER)
             rings.append(ring(ax, float(key.values[self.worst]), float(place[self.worst])))
-        several, more = of_several(record, self.scheme), len(self.keys) - len(axes)
+        several, more = record.of_several(self.scheme), len(self.keys) - len(axes)
         text = style.sentences(
             "Each panel shows all members against one swept key, whatever the others are.",
             explanation,
             "Darker cells hold more members; FAIL lies over INCONCLUSIVE over PASS."
-            * (len(record["case"]) > MOST_POINTS),
+            * (record.count > MOST_POINTS),
             f"{more} more keys are not shown; the table of members has them." * (more > 0),
         )
         title, figure = f"{words.capitalized(name)}{several}", axes[0].get_figure(root=True)

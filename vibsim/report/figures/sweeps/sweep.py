@@ -10,19 +10,18 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from vibsim.checks.number_units import unit_of
 from vibsim.core.array_types import Floats
-from vibsim.core.record import Record
 from vibsim.core.vocabulary import SEVERITY
-from vibsim.report import data, finest_level, frame, style, sweep_layout, words
-from vibsim.report.choice import position, promises
+from vibsim.report import finest_level, frame, style, sweep_layout, words
+from vibsim.report.choice import promises
+from vibsim.report.data import Results
 from vibsim.report.figures.panels import explosive, move_label_left, stacked
 from vibsim.report.figures.sweeps import separatrix, view
 from vibsim.report.figures.sweeps.view import View, Worst
 from vibsim.report.finest_level import Measured
 from vibsim.report.style import Picture
 from vibsim.report.sweep_layout import FEWEST_OF_A_LINE, Along
-from vibsim.report.types import Axes, Experiment, ValueCheck
+from vibsim.report.types import Axes, ValueCheck
 
 TALL, ENTRY = 3.0, 0.18  # least height of a panel, height of a legend entry [inch]
 RISE = 0.17  # vertical offset of a verdict from the next better one
@@ -33,19 +32,19 @@ LOG_RATIO = 10.0
 
 
 def views(
-    experiment: Experiment, record: Record, along: Along, quantities: list[str], worst: Worst
+    record: Results, along: Along, quantities: list[str], worst: Worst
 ) -> Iterator[View | str]:
     """Yield a view of each number along one key, or a sentence if all members share it."""
-    draw = _Drawing(experiment, record, along, worst)
+    draw = _Drawing(record, along, worst)
     both = [draw.period, draw.amplitude]
-    for draw_one in both if experiment.model.definition.conservative else both[::-1]:
+    for draw_one in both if record.model.conservative else both[::-1]:
         yield from draw_one()
     for quantity in quantities:
-        if data.whole(record, "triple"):
+        if record.triples:
             yield from draw.order(quantity)
         yield from draw.error(quantity)
         yield from draw.verdict(quantity)
-    for name, text, check in view.value_checks(experiment):
+    for name, text, check in view.value_checks(record):
         yield from draw.number(name, text, check)
 
 
@@ -53,16 +52,17 @@ def views(
 class _Drawing:
     """Views along one key."""
 
-    experiment: Experiment
-    record: Record
+    record: Results
     along: Along
     worst: Worst
 
     @cached_property
     def on_separatrix(self) -> list[float]:
         """Where the separatrix crosses the line of the members, if there is only one line."""
-        is_alone = len(self.along.lines) == 1 and not self.along.follows
-        return separatrix.on_line(self.experiment, self.along.key).tolist() if is_alone else []
+        if len(self.along.lines) > 1 or self.along.follows:
+            return []
+        places: list[float] = separatrix.on_line(self.record.experiment, self.along.key).tolist()
+        return places
 
     def _view(
         self, stem: str, name: str, quantity: str, values: Floats, caption: str, draw: Callable[[Axes], str],
@@ -75,7 +75,7 @@ class _Drawing:
         if text := view.shared(name, values, unit, form):
             yield text
         elif np.isfinite(values).any():
-            tall = max(TALL, ENTRY * len(self.record["scheme"]) * len(self.along.lines))
+            tall = max(TALL, ENTRY * len(self.record.schemes) * len(self.along.lines))
             (ax,) = stacked([tall])
             caption = style.sentences(caption, draw(ax))
             yield self._finished(ax, stem, name, caption, quantity, values, values, unit)
@@ -92,9 +92,7 @@ class _Drawing:
         dotted = "Dotted: the separatrix, where the exact period is infinite."
         marked = dotted * bool(self.on_separatrix)
         ax.set_gid(style.MEMBER)
-        is_ringed = view.ring(
-            ax, float(key.values[worst.case]), float(places[worst.scheme, worst.case])
-        )
+        is_ringed = view.ring(ax, float(key.values[worst.case]), float(places[worst.place]))
         title = words.capitalized(name)
         alt = f"{title} of every member against {key.name}"
         keys = [swept.key for swept in sweep_layout.keys(self.record)]
@@ -106,16 +104,15 @@ class _Drawing:
 
     def period(self) -> Iterator[View | str]:
         """Yield the period with its error bar, and its relative error on several levels."""
-        record, along, quantity = self.record, self.along, position(self.experiment)
-        period = finest_level.measured(record, "period", quantity)
-        exact = data.exact_periods(record)
+        record, quantity = self.record, self.record.model.position
+        period, exact = finest_level.measured(record, "period"), record.exact_periods
         if not np.isfinite(period.value).any():
             return
-        is_known, several = bool(np.isfinite(exact).any()), bool(data.whole(record, "pair"))
+        is_known, several = bool(np.isfinite(exact).any()), bool(record.pairs)
         bars = ", with its error bar from the two finest levels" * several
         yield from self._view(
             "period", "period", quantity, period.value, f"On the finest level{bars}{'; and the exact one' * is_known}.",
-            lambda ax: _draw_numbers(ax, record, along, period, exact if is_known else None), period.unit,
+            lambda ax: self._draw_numbers(ax, period, exact if is_known else None), period.unit,
         )  # fmt: skip
         spacing = (
             "From level to level it should fall by the same factor, so lines of successive levels are evenly spaced. "
@@ -124,13 +121,13 @@ class _Drawing:
         )
         yield from self._view(
             "period_error", "error of the period", quantity, finest_level.period_error(record, -1), spacing * several,
-            lambda ax: _draw_period_errors(ax, record, along, period), form="norm",
+            lambda ax: self._draw_period_errors(ax, period), form="norm",
         )  # fmt: skip
 
     def amplitude(self) -> Iterator[View | str]:
         """Yield the amplitude with its error bar."""
-        record, along, quantity = self.record, self.along, position(self.experiment)
-        amplitude = finest_level.measured(record, "amplitude", quantity)
+        record, quantity = self.record, self.record.model.position
+        amplitude = finest_level.measured(record, "amplitude")
         if not np.isfinite(amplitude.value).any():
             return
         size = frame.sizes(record, quantity)
@@ -144,7 +141,7 @@ class _Drawing:
 
         def draw(ax: Axes) -> str:
             move_label_left(ax)
-            _draw_bars(ax, record, along, replace(amplitude, error=error), None)
+            self._draw_bars(ax, replace(amplitude, error=error), None)
             finite = style.finite(value)
             is_wide = finite.size > 0 and float(finite.max()) > LOG_RATIO * float(np.median(finite))
             if explosive([value.ravel()]) or (is_wide and explosive([amplitude.value.ravel()])):
@@ -154,43 +151,40 @@ class _Drawing:
             else:
                 ax.set_ylim(*_room(replace(amplitude, value=value, error=error), None))
             style.label_values(ax, amplitude.name, amplitude.unit)
-            return _leaving(ax, along, amplitude.value)
+            return self._leaving(ax, amplitude.value)
 
-        explanation = (
-            "Half the height between the last peak and the last trough, on the finest level."
-        )
-        turns = bool(self.experiment.model.definition.turn)
-        explanation += " Members that go over the top have none." * turns
-        open_members = finest_level.unsettled(record, quantity)
+        text = "Half the height between the last peak and the last trough, on the finest level."
+        text += " Members that go over the top have none." * bool(record.model.turn)
+        open_members = finest_level.unsettled(record)
         if count := int(open_members.sum()):
             runs = f"{words.number(count, 'integer')} of {open_members.size} runs"
-            explanation += f" {runs} are not settled: {finest_level.SWINGS}."
+            text += f" {runs} are not settled: {finest_level.SWINGS}."
         yield from self._view(
-            "amplitude", "amplitude", quantity, amplitude.value, explanation, draw, amplitude.unit
+            "amplitude", "amplitude", quantity, amplitude.value, text, draw, amplitude.unit
         )
 
     def order(self, quantity: str) -> Iterator[View | str]:
         """Yield the stated order of every member with its interval."""
-        record, along, letter = self.record, self.along, words.symbol(quantity)
-        value, low, high = data.stated_orders(record, quantity)
-        basis = data.basis_of_order(record, quantity)
+        record, letter = self.record, words.symbol(quantity)
+        value, low, high = record.stated_orders(quantity)
+        basis = record.basis_of_order(quantity)
 
         def draw(ax: Axes) -> str:
-            promised = promises(self.experiment, record, quantity)
+            promised = promises(record, quantity)
             for order, tolerance in promised:
                 ax.axhspan(order - tolerance, order + tolerance, **style.ALLOWED)
                 ax.axhline(order, **style.REFERENCE, label=f"{basis}, {order:g} ± {tolerance:g}")
-            for curve in _curves(record, along):
+            for curve in self._curves():
                 look = style.look(curve.number) | {"markersize": 4, "linewidth": 0.8}
                 _interval(ax, curve.x, curve.of(low), curve.of(high), look["color"])
-                label = curve.text or style.entry(record.words("scheme")[curve.scheme])
+                label = curve.text or style.entry(record.schemes[curve.scheme])
                 _line(ax, curve.x, curve.of(value), label=label, **look)
             if promised:
                 least, most = promised[0][0], promised[-1][0]
                 bottom, top = style.limits(value, np.array([least - 0.25, most + 0.25]))
                 ax.set_ylim(max(bottom, least - 3), min(top, most + 2))
             ax.set_ylabel(f"order of {letter} ({words.USUAL_NORM})")
-            _beside(ax, along, fontsize=7.5 if style.crowded(record) else 8.5)
+            self._beside(ax, fontsize=7.5 if record.is_crowded else 8.5)
             return ""
 
         yield from self._view(
@@ -201,8 +195,8 @@ class _Drawing:
 
     def error(self, quantity: str) -> Iterator[View | str]:
         """Yield the error of every member at the finest level."""
-        record, along, name = self.record, self.along, f"error of {words.symbol(quantity)}"
-        error, unit = finest_level.error(record, quantity), data.norm_unit(record, quantity)
+        record, name = self.record, f"error of {words.symbol(quantity)}"
+        error, unit = finest_level.error(record, quantity), record.norm_unit(quantity)
 
         def draw(ax: Axes) -> str:
             both = np.stack([error.true, error.estimate])
@@ -213,7 +207,7 @@ class _Drawing:
                 np.where(np.isfinite(bounded[1]), style.no_zeros(end), np.nan)
                 for end in (error.low, error.high)
             )
-            for curve in _curves(record, along):
+            for curve in self._curves():
                 x, look = curve.x, style.look(curve.number)
                 _interval(ax, x, curve.of(low), curve.of(high), look["color"])
                 plain = {"color": look["color"], "linestyle": look["linestyle"], "linewidth": 1.0}
@@ -224,40 +218,36 @@ class _Drawing:
                     dots = look | {"linestyle": "none", "markersize": 4, "markerfacecolor": "white"}
                     _line(ax, x, curve.of(true), label=text, **dots)
             ax.set_ylabel(style.label(f"{name} ({words.USUAL_NORM})", unit))
-            if not style.crowded(record):
-                _beside(ax, along)
+            if not record.is_crowded:
+                self._beside(ax)
             # without bounded values all of them set the range
             fitted = any(
                 style.fit_log_axis(ax, "y", np.ravel(values), below=0.005, least=DEEP)
                 for values in (bounded, both)
             )
-            return _leaving(ax, along, error.best) if fitted else ""
+            return self._leaving(ax, error.best) if fitted else ""
 
-        explanation = "At the finest level, estimated from two levels"
+        text = ", estimated from two levels"
         if error.kind == "true":
-            explanation = (
-                "At the finest level: true (dots), and what two levels alone say of it (lines)"
-            )
-        has_pairs = bool(data.whole(record, "pair"))
-        explanation = (
-            f"{explanation}, with the interval of the order." if has_pairs else "The true error."
-        )
+            text = ": true (dots), and what two levels alone say of it (lines)"
+        text = f"At the finest level{text}, with the interval of the order."
         yield from self._view(
-            f"sweep_error_{quantity}", name, quantity, error.best, explanation, draw, unit, "norm"
-        )
+            f"sweep_error_{quantity}", name, quantity, error.best, text if record.pairs else "The true error.", draw,
+            unit, "norm",
+        )  # fmt: skip
 
     def verdict(self, quantity: str) -> Iterator[View | str]:
         """Yield the verdict on every member's order, one row per scheme."""
         name = f"verdict on {words.title(quantity)}"
         if f"{quantity}_status" not in self.record:
             return
-        status = data.flags(self.record, f"{quantity}_status")
+        status = self.record.flags(f"{quantity}_status")
         if text := view.shared_verdict(self.record, quantity):
             yield text
             return
-        row = 0.17 if style.crowded(self.record) else 0.3
+        row = 0.17 if self.record.is_crowded else 0.3
         (ax,) = stacked([row * max(2, len(status))])
-        _draw_verdicts(ax, self.along, status, self.record.words("scheme"))
+        _draw_verdicts(ax, self.along, status, self.record.schemes)
         ranks = list(SEVERITY)
         rank = np.array([[ranks.index(word) for word in of_scheme] for of_scheme in status])
         places = np.arange(len(status))[:, None] + RISE * rank
@@ -265,13 +255,100 @@ class _Drawing:
 
     def number(self, name: str, text: str, check: ValueCheck) -> Iterator[View | str]:
         """Yield the number, `text` in words, that a check asks for of every member."""
-        values = view.of_check(self.record, name, check)
-        unit = data.pretty_unit(unit_of(self.experiment, self.record, check))
+        values, unit = view.of_check(self.record, name, check), self.record.unit_of_number(check)
         number = Measured(text, unit, values, np.full(values.shape, np.nan))
         yield from self._view(
-            f"sweep_check_{name}", text, position(self.experiment), values, "",
-            lambda ax: _draw_numbers(ax, self.record, self.along, number, None, words.capitalized(text)), unit,
+            f"sweep_check_{name}", text, self.record.model.position, values, "",
+            lambda ax: self._draw_numbers(ax, number, None, words.capitalized(text)), unit,
         )  # fmt: skip
+
+    def _curves(self, *, by_line: bool = False) -> list[_Curve]:
+        """Return the curves of every scheme and line, ordered by scheme, or `by_line`."""
+        names, lines, count = self.record.schemes, self.along.lines, len(self.along.lines)
+        curves = []
+        for s, name in enumerate(names):
+            scheme = name if len(names) > 1 else ""
+            for k, (line, at) in enumerate(lines):
+                curves.append(
+                    _Curve(s, s * count + k, self.along.key.values[at], at, _text(scheme, line))
+                )
+        return sorted(curves, key=lambda curve: curve.number % count) if by_line else curves
+
+    def _draw_numbers(
+        self, ax: Axes, number: Measured, exact: Floats | None, title: str = ""
+    ) -> str:
+        """Draw a number of the finest level with its error bars, and the exact number if it is known."""
+        self._draw_bars(ax, number, exact, title)
+        ax.set_ylim(*_room(number, exact))
+        style.label_values(ax, number.name, number.unit)
+        return ""
+
+    def _draw_bars(self, ax: Axes, number: Measured, exact: Floats | None, title: str = "") -> None:
+        """Draw the same without limits and label of the vertical axis."""
+        count, level = len(self.record.schemes), self.record.levels[-1]
+        for curve in self._curves(by_line=True):
+            if exact is not None and curve.scheme == 0:
+                values = np.where(np.isfinite(exact), exact, np.nan)[curve.members]
+                text = "" if curve.number else "exact"
+                _line(ax, curve.x, values, color="black", linewidth=1.0, label=text, zorder=1)
+            value, error = curve.of(number.value), curve.of(number.error)
+            look = _mark(curve.scheme, curve.number, count)
+            _interval(ax, curve.x, value - error, value + error, look["color"])
+            # dots are easier to tell from the line of the exact number
+            has_dots = exact is not None and curve.x.size <= MOST_MARKERS
+            dashes = "none" if has_dots else style.look(curve.number)["linestyle"]
+            text = curve.text or f"level {level}"
+            _line(ax, curve.x, value, linestyle=dashes, linewidth=1.0, label=text, **look)
+        ax.set_title(title or f"{number.name.capitalize()}, level {level}")
+        self._beside(ax, fontsize=7.5 if self.record.is_crowded else 8)
+
+    def _draw_period_errors(self, ax: Axes, period: Measured) -> str:
+        """Draw the relative error of the period on several levels, and its estimate from the two finest."""
+        record, levels, schemes = self.record, self.record.levels, len(self.record.schemes)
+        several = len(self.along.lines) > 1 or record.is_crowded
+        count = 1 if several else 6 if schemes == 1 else 3
+        spaced = np.linspace(len(levels) - 1, 0, min(len(levels), count)).round().astype(int)
+        error = {i: finest_level.period_error(record, i) for i in np.unique(spaced)[::-1].tolist()}
+        with np.errstate(invalid="ignore", divide="ignore"):
+            predicted = style.no_zeros(period.error / period.value)
+        for curve in self._curves(by_line=True):
+            text = "" if curve.number else f"estimated, level {levels[-1]}"
+            grey: dict[str, Any] = {"color": "#9a9a9a", "linewidth": 4.0, "alpha": 0.6, "zorder": 1}
+            _line(ax, curve.x, curve.of(predicted), label=text, **grey)
+            line, s = divmod(curve.number, len(self.along.lines))[::-1]
+            for m, (i, level_error) in enumerate(error.items()):
+                colour = line + s if several else m
+                text = ", ".join(filter(None, [curve.text, f"level {levels[i]}"]))
+                look = _mark(s, colour, schemes) | {"linewidth": 1.2}
+                look |= {"linestyle": style.look(colour)["linestyle"]}
+                _line(ax, curve.x, curve.of(style.no_zeros(level_error)), label=text, **look)
+        style.fit_log_axis(ax, "y", *error.values(), room=2.0)
+        ax.set(ylabel="|period / exact − 1|", title="Relative error of the period")
+        if not record.is_crowded:
+            self._beside(ax, fontsize=8)
+        return ""
+
+    def _leaving(self, ax: Axes, values: Floats) -> str:
+        """Mark at the upper edge the values, shape (scheme, case), that leave the frame; return the sentence on them.
+
+        Of few members each is marked, of many the first of every run of successive ones.
+        """
+        high, leaves = ax.get_ylim()[1], False
+        for s in range(values.shape[0]):
+            for _, members in self.along.lines:
+                x, y = self.along.key.values[members], values[s, members]
+                grown = np.where(y > high, y, np.where(np.isfinite(y), high, np.nan))
+                each = x.size <= MOST_MARKERS
+                leaves |= frame.mark_leaving(ax, x, grown, color=style.look(s)["color"], each=each)
+        return frame.LEAVING if leaves else ""
+
+    def _beside(self, ax: Axes, **options: Any) -> None:
+        """Put the legend beside the axes, with the key in which lines differ as its title."""
+        name = self.along.lines[0][0]
+        if " = " in name and ", " not in name:
+            key = name.rpartition(" = ")[0]
+            options |= {"title": key, "title_fontsize": 8, "alignment": "left"}
+        style.beside(ax, **options)
 
 
 @dataclass(frozen=True)
@@ -288,17 +365,6 @@ class _Curve:
     def of(self, values: Floats) -> Floats:
         """Return the values of its members, of values of the shape (scheme, case)."""
         return np.asarray(values[self.scheme, self.members])
-
-
-def _curves(record: Record, along: Along, *, by_line: bool = False) -> list[_Curve]:
-    """Return the curves of every scheme and line, ordered by scheme, or `by_line`."""
-    names, count = record.words("scheme"), len(along.lines)
-    curves = []
-    for s, name in enumerate(names):
-        scheme = name if len(names) > 1 else ""
-        for k, (line, at) in enumerate(along.lines):
-            curves.append(_Curve(s, s * count + k, along.key.values[at], at, _text(scheme, line)))
-    return sorted(curves, key=lambda curve: curve.number % count) if by_line else curves
 
 
 def _draw_verdicts(ax: Axes, along: Along, status: NDArray[Any], schemes: list[str]) -> None:
@@ -327,38 +393,6 @@ def _draw_verdicts(ax: Axes, along: Along, status: NDArray[Any], schemes: list[s
     ax.legend(ncols=3, fontsize=8, handlelength=1.2, **place)
 
 
-def _draw_numbers(
-    ax: Axes, record: Record, along: Along, number: Measured, exact: Floats | None, title: str = ""
-) -> str:
-    """Draw a number of the finest level with its error bars, and the exact number if it is known."""
-    _draw_bars(ax, record, along, number, exact, title)
-    ax.set_ylim(*_room(number, exact))
-    style.label_values(ax, number.name, number.unit)
-    return ""
-
-
-def _draw_bars(
-    ax: Axes, record: Record, along: Along, number: Measured, exact: Floats | None, title: str = ""
-) -> None:
-    """Draw the same without limits and label of the vertical axis."""
-    count, level = len(record["scheme"]), data.whole(record, "level")[-1]
-    for curve in _curves(record, along, by_line=True):
-        if exact is not None and curve.scheme == 0:
-            values = np.where(np.isfinite(exact), exact, np.nan)[curve.members]
-            text = "" if curve.number else "exact"
-            _line(ax, curve.x, values, color="black", linewidth=1.0, label=text, zorder=1)
-        value, error = curve.of(number.value), curve.of(number.error)
-        look = _mark(curve.scheme, curve.number, count)
-        _interval(ax, curve.x, value - error, value + error, look["color"])
-        # dots are easier to tell from the line of the exact number
-        has_dots = exact is not None and curve.x.size <= MOST_MARKERS
-        dashes = "none" if has_dots else style.look(curve.number)["linestyle"]
-        text = curve.text or f"level {level}"
-        _line(ax, curve.x, value, linestyle=dashes, linewidth=1.0, label=text, **look)
-    ax.set_title(title or f"{number.name.capitalize()}, level {level}")
-    _beside(ax, along, fontsize=7.5 if style.crowded(record) else 8)
-
-
 def _room(number: Measured, exact: Floats | None) -> tuple[float, float]:
     """Return limits that hold all values and their error bars, these up to the spread of the values."""
     values = style.finite(number.value)
@@ -366,48 +400,6 @@ def _room(number: Measured, exact: Floats | None) -> tuple[float, float]:
     error = np.clip(np.nan_to_num(number.error), 0.0, most)
     shown = [number.value - error, number.value + error]
     return style.limits(*(shown if exact is None else [*shown, exact]))
-
-
-def _draw_period_errors(ax: Axes, record: Record, along: Along, period: Measured) -> str:
-    """Draw the relative error of the period on several levels, and its estimate from the two finest."""
-    levels, schemes = data.whole(record, "level"), len(record["scheme"])
-    several = len(along.lines) > 1 or style.crowded(record)
-    count = 1 if several else 6 if schemes == 1 else 3
-    spaced = np.linspace(len(levels) - 1, 0, min(len(levels), count)).round().astype(int)
-    error = {i: finest_level.period_error(record, i) for i in np.unique(spaced)[::-1].tolist()}
-    with np.errstate(invalid="ignore", divide="ignore"):
-        predicted = style.no_zeros(period.error / period.value)
-    for curve in _curves(record, along, by_line=True):
-        text = "" if curve.number else f"estimated, level {levels[-1]}"
-        grey: dict[str, Any] = {"color": "#9a9a9a", "linewidth": 4.0, "alpha": 0.6, "zorder": 1}
-        _line(ax, curve.x, curve.of(predicted), label=text, **grey)
-        line, s = divmod(curve.number, len(along.lines))[::-1]
-        for m, (i, level_error) in enumerate(error.items()):
-            colour = line + s if several else m
-            text = ", ".join(filter(None, [curve.text, f"level {levels[i]}"]))
-            look = _mark(s, colour, schemes) | {"linewidth": 1.2}
-            look |= {"linestyle": style.look(colour)["linestyle"]}
-            _line(ax, curve.x, curve.of(style.no_zeros(level_error)), label=text, **look)
-    style.fit_log_axis(ax, "y", *error.values(), room=2.0)
-    ax.set(ylabel="|period / exact − 1|", title="Relative error of the period")
-    if not style.crowded(record):
-        _beside(ax, along, fontsize=8)
-    return ""
-
-
-def _leaving(ax: Axes, along: Along, values: Floats) -> str:
-    """Mark at the upper edge the values, shape (scheme, case), that leave the frame; return the sentence on them.
-
-    Of few members each is marked, of many the first of every run of successive ones.
-    """
-    high, leaves = ax.get_ylim()[1], False
-    for s in range(values.shape[0]):
-        for _, members in along.lines:
-            x, y = along.key.values[members], values[s, members]
-            grown = np.where(y > high, y, np.where(np.isfinite(y), high, np.nan))
-            each = x.size <= MOST_MARKERS
-            leaves |= frame.mark_leaving(ax, x, grown, color=style.look(s)["color"], each=each)
-    return frame.LEAVING if leaves else ""
 
 
 def _line(ax: Axes, x: Floats, y: Floats, **look: Any) -> None:
@@ -432,15 +424,6 @@ def _text(*parts: str) -> str:
     """Join the words of a legend entry; a line that differs in one key has only its value."""
     short = (part if ", " in part else part.rpartition(" = ")[2] for part in parts if part)
     return style.entry(", ".join(short))
-
-
-def _beside(ax: Axes, along: Along, **options: Any) -> None:
-    """Put the legend beside the axes, with the key in which lines differ as its title."""
-    name = along.lines[0][0]
-    if " = " in name and ", " not in name:
-        key = name.rpartition(" = ")[0]
-        options |= {"title": key, "title_fontsize": 8, "alignment": "left"}
-    style.beside(ax, **options)
 
 
 def _mark(scheme: int, colour: int, count: int) -> dict[str, Any]:

@@ -11,13 +11,12 @@ import numpy as np
 from vibsim.checks.fields import field_values
 from vibsim.checks.value_text import what
 from vibsim.core.array_types import Floats
-from vibsim.core.record import Record
 from vibsim.core.vocabulary import REASONS
 from vibsim.report import finest_level, style, words
-from vibsim.report.data import Member, flags
+from vibsim.report.data import Member, Results
 from vibsim.report.style import Picture
 from vibsim.report.sweep_layout import Key
-from vibsim.report.types import Axes, Experiment, ValueCheck
+from vibsim.report.types import Axes, ValueCheck
 
 SHOWN_ALREADY = ("period", "period_error", "exact_period", "amplitude")
 """Values of checks whose views exist anyway."""
@@ -50,10 +49,10 @@ class View:
     """Position of the marked member."""
 
 
-def value_checks(experiment: Experiment) -> list[tuple[str, str, ValueCheck]]:
+def value_checks(record: Results) -> list[tuple[str, str, ValueCheck]]:
     """Return id, number in words and value check, once for each number of all members that has no view elsewhere."""
     found: dict[tuple[str, str | None], tuple[str, str, ValueCheck]] = {}
-    for asserted in experiment.checks:
+    for asserted in record.experiment.checks:
         check = asserted.measured
         if check.kind != "value" or check.at.case is not None or check.value in SHOWN_ALREADY:
             continue
@@ -70,15 +69,15 @@ def of_a_member(check: ValueCheck, finest: int | None = None) -> tuple[str, Valu
     return f"{of}{what(check, words.PAGE)}{at}", check.model_copy(update={"take": None})
 
 
-def of_check(record: Record, name: str, check: ValueCheck) -> Floats:
+def of_check(record: Results, name: str, check: ValueCheck) -> Floats:
     """Return the numbers of a check, shape (scheme, case); NaN for schemes that it does not judge."""
-    schemes = np.array([check.at.scheme in (None, scheme) for scheme in record.words("scheme")])
+    schemes = np.array([check.at.scheme in (None, scheme) for scheme in record.schemes])
     return np.where(schemes[:, None], field_values(record, name, "value"), np.nan)
 
 
-def shared_verdict(record: Record, quantity: str, scheme: int | None = None) -> str:
+def shared_verdict(record: Results, quantity: str, scheme: int | None = None) -> str:
     """Say which verdict all members share, of all schemes or of one; empty if they differ."""
-    reason = flags(record, f"{quantity}_reason")[slice(None) if scheme is None else scheme]
+    reason = record.flags(f"{quantity}_reason")[slice(None) if scheme is None else scheme]
     reasons = np.unique(reason.astype(str))
     if reasons.size != 1:
         return ""
