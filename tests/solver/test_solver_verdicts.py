@@ -93,6 +93,17 @@ def test_an_accuracy_is_open_where_the_order_is(tmp_path: Path) -> None:
     assert left.results[0].verdict.reason == "pre_asymptotic"
 
 
+def test_an_accuracy_that_is_open_states_no_bound_that_would_decide_it(tmp_path: Path) -> None:
+    """A start of first order in a scheme of second order: the error was "at most 0.0053", and open for 0.1."""
+    found = experiment(tmp_path, "[{accurate: u, relative: 0.1}, {converges: u, order: 2}]")
+    accurate, _ = judged(found, lambda _, h: 1.0 + 0.1 * h + h * h)
+    verdict = accurate.results[0].verdict
+    assert (verdict.status, verdict.reason) == ("INCONCLUSIVE", "pre_asymptotic")
+    assert "at most" not in verdict.sentence
+    assert "The order is not known, so the estimate of the error at h = 0.03125" in verdict.sentence
+    assert "Add a finer level" in verdict.advice
+
+
 def test_exact_values_decide_the_limit_and_the_error(tmp_path: Path) -> None:
     checks = "[{converges: u, order: 2}, {accurate: u, absolute: 1e-3}]"
     # the error of member a = 1, 2 is a/1024 at the finest level

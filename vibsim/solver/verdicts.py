@@ -194,7 +194,16 @@ def _words(
             "Give `absolute:` in place of `relative:`.",
         )
     if not decides:
-        finding = f"{name} may or may not be as accurate {accuracy}. {verdict.sentence}"
+        # the sentence on the order states a bound of the error, which holds only if the levels converge
+        why = (
+            verdict.sentence
+            if verdict.error is None
+            else (
+                f"The order is not known, so the estimate of the error at {h} ({number(abs(verdict.error) / unit, 2)}"
+                f"{of_size}) cannot be trusted."
+            )
+        )
+        finding = f"{name} may or may not be as accurate {accuracy}. {why}"
         return finding, verdict.advice or "Add a finer level."
     error, bound = abs(verdict.error or 0.0) / unit, (verdict.error_bound or 0.0) / unit
     least = max(2.0 * error - bound, 0.0)
