@@ -26,10 +26,8 @@ def picture(record: Results, check: EqualCheck, name: str, member: Member) -> Pi
     bound, level, most = (
         measured(record, name, field, member) for field in ("allowed", "level", "distance")
     )
-    ladder, second = (
-        Ladder(record, check.quantity, member),
-        SOLUTIONS.get(check.second, check.second),
-    )
+    ladder = Ladder(record, check.quantity, member)
+    second = SOLUTIONS.get(check.second, check.second)
     subject = f"{member.title}, level {level:.0f}: its {ladder.letter}"
     if not np.isfinite(distance).any():
         return None

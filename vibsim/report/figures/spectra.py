@@ -30,11 +30,8 @@ def spectrum(record: Results, member: Member) -> Picture | None:
     # few pages have a spectrum
     from vibsim.observe import spectrum as observed
 
-    ladder, levels, model = (
-        Ladder(record, record.model.position, member),
-        record.levels,
-        record.model,
-    )
+    levels, model = record.levels, record.model
+    ladder = Ladder(record, model.position, member)
     t = ladder.t
     if t.size < 2 * observed.FIRST_LINE + 4:
         return None

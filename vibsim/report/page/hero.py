@@ -216,10 +216,8 @@ def _error(lead: CheckedLadder) -> Iterator[Number]:
             else f"equal to the {record.name_of_exact} solution"
         )
         note = f"{equal} in every digit"
-    steps, letter = (
-        words.number(record.steps[-1], "integer"),
-        findings.short(record.model, lead.quantity),
-    )
+    steps = words.number(record.steps[-1], "integer")
+    letter = findings.short(record.model, lead.quantity)
     yield {
         "label": f"Error of {letter} at {steps} steps{record.of_several(lead.scheme)}",
         "value": f"{words.number(mean, 'brief')} {lead.norm_unit('linf')}".rstrip(),
