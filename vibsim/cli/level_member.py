@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 from vibsim.cli import outcome_text
 from vibsim.cli.jobs.common import refusal
-from vibsim.core.errors import VibsimError, nearest
+from vibsim.core.errors import DamagedFileError, VibsimError, nearest
 from vibsim.core.home import called
 from vibsim.plan import Plan, ShardJob
 
@@ -84,8 +84,8 @@ def read(path: Path, place: int) -> Record:
     with ExitStack() as stack:
         try:
             level = stack.enter_context(store.open_level([(path, None)]))
-        except KeyError:
-            # a level of a user's solver lacks the dimension ``case``
+        except DamagedFileError:
+            # a level of a user's solver has no members; a file that is damaged is refused here, too
             return store.read(path)
         if not 0 <= place < level.cases:
             raise refusal("--case", place, f"{path}: must be from 0 to {level.cases - 1}")
