@@ -18,7 +18,13 @@ from vibsim.checks.sentences import MemberFacts, cost_in_words, growth_in_words
 from vibsim.checks.stable import SAME_TIME, first_within
 from vibsim.comparison.comparison_variables import has_exact
 from vibsim.core.record import Record
-from vibsim.core.vocabulary import POSITION_VECTOR, TYPICAL_NORM, is_error_part, whole_of
+from vibsim.core.vocabulary import (
+    LEVELS_OF_AN_ORDER,
+    POSITION_VECTOR,
+    TYPICAL_NORM,
+    is_error_part,
+    whole_of,
+)
 from vibsim.experiment.schema.checks import ConvergesCheck
 from vibsim.experiment.sweep_columns import recorded_columns
 from vibsim.models.base import components
@@ -124,6 +130,17 @@ class OrderContext:
         if len(names) == 1 or len(stored) < len(names):
             return {}
         return {name: float(record[f"{name}_difference_norm"][place]) ** 2 for name in names}
+
+    @cached_property
+    def speeds_differ(self) -> float:
+        """The largest factor between the largest speeds of the finest three levels; NaN if they are not stored."""
+        f, ends = self._facts, ("min", "max")
+        names = [f"{velocity}_{end}" for velocity in f.model.velocities for end in ends]
+        if any(name not in f.record for name in names):
+            return math.nan
+        of_levels = np.max([np.abs(f.record[name][f.scheme, f.case]) for name in names], axis=0)
+        last = of_levels[-LEVELS_OF_AN_ORDER:]
+        return float(np.max(last) / np.min(last)) if np.min(last) > 0.0 else math.nan
 
     @cached_property
     def centred(self) -> float:

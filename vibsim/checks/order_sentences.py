@@ -161,6 +161,12 @@ DIAGNOSES: Words = {
         "{subject} is at rest at every common time, while the exact solution moves. The step is still too coarse.",
         "{more_levels}",
     ),
+    "pre_asymptotic, pole": (
+        "The finest two levels of {what} agree to 1 % of its size up to t = {parts_at:3} only, of {end:4}. The largest "
+        "speeds of the finest levels differ by a factor of {speeds_differ:2}, as where a force becomes infinite.",
+        "End the time interval (`time: end`) before t = {parts_at:3}, or check the formulas of `model:`. No level "
+        "follows a motion through a point where the force is infinite.",
+    ),
     "pre_asymptotic, parting": (
         "The finest two levels of {what} agree to 1 % of its size up to t = {parts_at:3} only, of {end:4}. "
         "This motion makes every error ten times larger in a time of about {tenfold:2}, so the levels part.",

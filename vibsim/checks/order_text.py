@@ -24,6 +24,9 @@ HIGHEST = 12.0
 """No scheme has an order above this."""
 FAR_DOWN = 1.0
 """An interval that extends further below its order contains a lower power of the expansion."""
+UNEVEN_SPEEDS = 2.0
+"""Factor between the largest speeds of levels that part, above which the force may be infinite somewhere: those of a
+chaotic motion are alike."""
 LAST_ORDERS = 4
 """Number of the last orders that are reported."""
 NEAR_DUE = 0.3
@@ -67,6 +70,7 @@ def _diagnosis(s: OrderContext) -> str:
         },
         "pre_asymptotic": {
             s.cause: by_cause in DIAGNOSES,
+            "pole": not math.isnan(s.parts_at) and s.speeds_differ > UNEVEN_SPEEDS,
             "parting": not math.isnan(s.parts_at),
             "growing": s.order <= 0.0,
             "steep": s.order > HIGHEST,

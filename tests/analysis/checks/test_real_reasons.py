@@ -190,6 +190,18 @@ LADDERS = {
         ("INCONCLUSIVE", "pre_asymptotic"),
         ("up to t = 24.4 only, of 30", "add levels 13 to 15"),
     ),
+    "a fall into a centre of attraction, which the motion reaches at pi/sqrt(8)": Ladder(
+        {
+            "model": {"kind": "oscillator", "spring": "1/u**2", "potential": "-1/u"},
+            "initial": {"u": 1.0},
+            "time": {"end": 1.2},
+        },
+        "rk4",
+        (5, 6, 7, 8, 9),
+        {"converges": "u", "order": 4},
+        ("INCONCLUSIVE", "pre_asymptotic"),
+        ("up to t = 1.12 only, of 1.2", "as where a force becomes infinite", "check the formulas"),
+    ),
     "levels that are too coarse, and errors that grow like a power of the time": Ladder(
         {**PENDULUM, "time": {"end": 200.0}},
         "rk4",
@@ -255,7 +267,8 @@ def judged(ladder: Ladder) -> Verdict:
     return verdict
 
 
-SHOWN = ("first-order start", "unstable")
+FALL = "a fall into a centre of attraction, which the motion reaches at pi/sqrt(8)"
+SHOWN = ("first-order start", "unstable", FALL)
 """Of these a sentence tells what only series say."""
 
 
