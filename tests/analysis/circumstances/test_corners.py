@@ -173,6 +173,22 @@ def test_the_power_that_a_corner_leaves(
     assert words in found[2]
 
 
+@pytest.mark.parametrize("scheme", ["rk4", "yoshida4"])
+def test_a_contact_leaves_a_broken_power_by_every_scheme(scheme: str) -> None:
+    """It was a corner for one and a jump of a derivative for the other."""
+    made = experiment(
+        [scheme],
+        model={"kind": "oscillator", "spring": "u + max(u - 0.2, 0)**1.5"},
+        initial={"u": -1.0},
+        time={"end": 4.0, "base_steps": 10},
+        levels=[3, 4, 5, 6, 7],
+    )
+    (verdict,) = judged(made)
+    assert verdict.reason == "non_smooth"
+    assert "the force changes like the power 1.5 of the distance within a step" in verdict.text
+    assert "Expect order 2.5" in verdict.text
+
+
 def test_a_smooth_force_has_no_corners() -> None:
     made = experiment(["rk4"], model={"kind": "oscillator", "spring": "sin(u)"}, levels=[4, 5])
     assert not switches_of(made.model.definition)
