@@ -4,14 +4,17 @@ from __future__ import annotations
 
 import importlib
 import os
+import pickle
 import signal
 import subprocess
 import sys
 import traceback
+from collections.abc import Callable
 from contextlib import chdir
 from functools import partial
 from pathlib import Path
-from typing import Any
+from tempfile import TemporaryFile
+from typing import IO, Any, NoReturn
 
 from vibsim.convergence.study.grid_values import GridValues
 from vibsim.core.errors import VibsimError, nearest
@@ -33,7 +36,7 @@ def make(
     Parameters
     ----------
     work
-        An empty folder for the output of a command.
+        An empty folder for the output of a command or a function.
     threads
         The value of ``{threads}`` in the command.
 
@@ -48,7 +51,8 @@ def make(
         # the file is untrusted: it may be a link to any file of the user, so messages must not show its content
         return level_output.read(path, quantities, is_shown=False)
     if kind == "python":
-        return level_output.from_dataset(_called(experiment, level, member), quantities)
+        called = partial(_called, experiment, level, member)
+        return _in_a_child(lambda: level_output.from_dataset(called(), quantities), work)
     files = {name: str(work / (name if "." in name else f"{name}.nc")) for name in OUTPUTS}
     command = experiment.arguments(level, member, {**files, "threads": str(threads)})
     _run(command, experiment.folder)
@@ -80,12 +84,61 @@ def _run(command: list[str], folder: Path) -> None:
     except (OSError, ValueError) as error:
         reason = getattr(error, "strerror", None) or error
         raise VibsimError(f"{command[0]}: the program cannot be started ({reason})") from None
-    status = ended.returncode
+    if ended.returncode:
+        raise VibsimError(f"the command {_end(ended.returncode)}")
+
+
+def _end(status: int) -> str:
+    """Say how a process ended, from its exit status, or from a signal as a negative number."""
     if status < 0:
         names = {number.value: number.name for number in signal.Signals}
-        raise VibsimError(f"the command was killed by {names.get(-status, -status)}")
-    if status:
-        raise VibsimError(f"the command ended with exit status {status}")
+        return f"was killed by {names.get(-status, -status)}"
+    return f"ended with exit status {status}"
+
+
+def _in_a_child(values: Callable[[], dict[str, GridValues]], work: Path) -> dict[str, GridValues]:
+    """Return what `values` returns in a child process, which a library may end or crash; it ends with this process.
+
+    The child hands over the values, or the sentence of an error, in a file of `work` that has no name.
+    """
+    sys.stdout.flush()
+    sys.stderr.flush()
+    parent = os.getpid()
+    with TemporaryFile(dir=work) as result:
+        child = os.fork()
+        if not child:
+            _write(values, result, parent)
+        status = os.waitstatus_to_exitcode(os.waitpid(child, 0)[1])
+        if status or not result.seek(0, os.SEEK_END):
+            rule = f"{_end(status)} before the function returned"
+            raise VibsimError(f"the process of the function {rule}")
+        result.seek(0)
+        # the child alone can have written it
+        answer: dict[str, GridValues] | str = pickle.load(result)
+    if isinstance(answer, str):
+        raise VibsimError(answer)
+    return answer
+
+
+def _write(values: Callable[[], dict[str, GridValues]], result: IO[bytes], parent: int) -> NoReturn:
+    """Write the values, or the sentence of an error, to the file `result`, and end this process."""
+    status = 1
+    try:
+        end_with(parent)
+        answer: dict[str, GridValues] | str
+        try:
+            answer = values()
+        except VibsimError as error:
+            answer = str(error)
+        pickle.dump(answer, result)
+        result.flush()
+        status = 0
+    except BaseException:
+        traceback.print_exc(file=sys.stdout)
+    finally:
+        sys.stdout.flush()
+        sys.stderr.flush()
+        os._exit(status)
 
 
 def _called(experiment: SolverExperiment, level: int, member: int) -> Any:
