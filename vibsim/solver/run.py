@@ -23,6 +23,9 @@ from vibsim.core.signatures import misfit
 from vibsim.experiment.solver import OUTPUTS, SolverExperiment
 from vibsim.solver import level_output
 
+_Answer = dict[str, GridValues] | tuple[str, str]
+"""The quantities, or the sentence of an error and the traceback of what the user's function raised."""
+
 
 def make(
     experiment: SolverExperiment,
@@ -99,7 +102,7 @@ def _end(status: int) -> str:
 def _in_a_child(values: Callable[[], dict[str, GridValues]], work: Path) -> dict[str, GridValues]:
     """Return what `values` returns in a child process, which a library may end or crash; it ends with this process.
 
-    The child hands over the values, or the sentence of an error, in a file of `work` that has no name.
+    The child hands them over in a file of `work` that has no name.
     """
     sys.stdout.flush()
     sys.stderr.flush()
@@ -114,22 +117,25 @@ def _in_a_child(values: Callable[[], dict[str, GridValues]], work: Path) -> dict
             raise VibsimError(f"the process of the function {rule}")
         result.seek(0)
         # the child alone can have written it
-        answer: dict[str, GridValues] | str = pickle.load(result)
-    if isinstance(answer, str):
-        raise VibsimError(answer)
-    return answer
+        answer: _Answer = pickle.load(result)
+    if isinstance(answer, dict):
+        return answer
+    sentence, traced = answer
+    print(traced, end="", flush=True)
+    raise VibsimError(sentence)
 
 
 def _write(values: Callable[[], dict[str, GridValues]], result: IO[bytes], parent: int) -> NoReturn:
-    """Write the values, or the sentence of an error, to the file `result`, and end this process."""
+    """Write the values, or why there are none, to the file `result`, and end this process."""
     status = 1
     try:
         end_with(parent)
-        answer: dict[str, GridValues] | str
+        answer: _Answer
         try:
             answer = values()
         except VibsimError as error:
-            answer = str(error)
+            cause = error.__cause__
+            answer = str(error), "".join(traceback.format_exception(cause)) if cause else ""
         pickle.dump(answer, result)
         result.flush()
         status = 0
@@ -166,5 +172,4 @@ def _called(experiment: SolverExperiment, level: int, member: int) -> Any:
         except VibsimError:
             raise
         except (Exception, SystemExit) as error:
-            traceback.print_exc(file=sys.stdout)
-            raise VibsimError(f"{text} raised {type(error).__name__}: {error}") from None
+            raise VibsimError(f"{text} raised {type(error).__name__}: {error}") from error
