@@ -61,6 +61,9 @@ def read(paths: Sequence[Path], size: str, quantities: Sequence[str]) -> list[St
     if listed is not None and len(listed) != len(paths):
         rule = f"has {len(listed)} step sizes for {len(paths)} files"
         _refuse("vibsim judge", "--h", size, rule)
+    for i, path in enumerate(paths):
+        if path in paths[:i]:
+            _refuse(str(path), "", "", "is named twice, and every level has a file of its own")
     chosen = list(dict.fromkeys(quantities))
     h, units = list[float](), dict[str, Path]()
     values: dict[str, list[GridValues]] = {name: [] for name in chosen}
