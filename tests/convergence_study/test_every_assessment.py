@@ -35,6 +35,7 @@ def decided(ladder: Ladder, reason: str, *, known: bool) -> Assessment:
         weights=weights,
         best_bound=1e-3 * number,
         contradicted=np.full(shape, known),
+        logarithm=number,
     )
 
 

@@ -28,6 +28,7 @@ from vibsim.convergence.likely_powers import (
     interval,
     likely_power,
     likely_window,
+    logarithmic_power,
     most_near_a_power,
     rests_on_three,
 )
@@ -62,6 +63,7 @@ class Assessment(Decision):
     error_bound: Floats  # upper bound of that norm
     weights: Floats  # weights of the levels in the best value, shape (ladder, level)
     best_bound: Floats  # upper bound of the distance from the best value to the limit
+    logarithm: Floats  # power that a logarithm multiplies; NaN if the levels do not show one
 
 
 def assess(ladder: Ladder, question: Question) -> Assessment:
@@ -94,6 +96,7 @@ def _assess_block(ladder: Ladder, factors: Floats, question: Question) -> dict[s
         missed = missed | (_approach_a_limit(levels_only) & is_missed(ladder, levels_only))
     numbers = _numbers(ladder, evaluation, levels_only, missed)
     values = best_value(ladder, levels_only, evaluation.only_noise, factors)
+    values["logarithm"] = logarithmic_power(evaluation.posterior)
     if not ladder.exact_known:
         is_open = is_one_of(numbers["reason"], "pre_asymptotic")
         for row in values.values():

@@ -49,7 +49,7 @@ def in_blocks(
 
 def _unknown(count: int, levels: int) -> dict[str, np.ndarray]:
     """Return the fields of undecided ladders, except for the reason."""
-    names = ("order", "low", "high", "error", "error_bound", "best_bound")
+    names = ("order", "low", "high", "error", "error_bound", "best_bound", "logarithm")
     numbers = {name: np.full(count, np.nan) for name in names}
     window = {"first": np.zeros(count, dtype=np.int64), "last": np.full(count, levels - 1)}
     weights = np.full((count, levels), np.nan)

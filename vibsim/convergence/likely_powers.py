@@ -6,7 +6,7 @@ import numpy as np
 
 from vibsim.convergence.error_model.posterior import Posterior
 from vibsim.convergence.question import Question
-from vibsim.convergence.thresholds import ORDER_INTERVAL, THREE_DECIDE
+from vibsim.convergence.thresholds import DEFINITE, LOWEST_ORDER, ORDER_INTERVAL, THREE_DECIDE
 from vibsim.core.array_types import Flags, Floats, Integers
 from vibsim.core.vocabulary import ORDER_TOLERANCE
 
@@ -32,6 +32,8 @@ def sides(p: Posterior, question: Question) -> tuple[Floats, Floats, Floats]:
     lower, right, higher = sums[:, low], sums[:, high] - sums[:, low], sums[:, -1] - sums[:, high]
     # mixed powers have no order, but it is lower if both powers are lower, and higher if both are higher
     first, second = p.pairs.T
+    # a power times a logarithm lies between it and the next lower one
+    first = np.where(first == second, first - LOWEST_ORDER, first)
     lower = lower + np.sum(p.mixed[:, second < least], axis=-1)
     higher = higher + np.sum(p.mixed[:, first > most], axis=-1)
     if question.expected is None:
@@ -52,8 +54,8 @@ def windows_of_three(p: Posterior) -> Floats:
 
 def most_near_a_power(p: Posterior) -> Floats:
     """Return the probability that the most probable power, within the usual tolerance, dominates or is one of two."""
-    # mixed powers are further apart than the tolerance
-    present = p.lowest + p.highest - p.dominant
+    # mixed powers are further apart than the tolerance, or the same
+    present = p.lowest + p.highest - p.dominant - p.with_logarithm
     near = _sums_near(present, p, ORDER_TOLERANCE + ROUNDED)
     return np.asarray(np.max(near, axis=-1))
 
@@ -77,6 +79,13 @@ def _cumulative(values: Floats) -> Floats:
 def likely_power(p: Posterior) -> Floats:
     """Return the power that most probably dominates each ladder."""
     return np.asarray(p.powers[np.argmax(p.dominant, axis=-1)])
+
+
+def logarithmic_power(p: Posterior) -> Floats:
+    """Return the power that a logarithm multiplies, NaN unless that is as probable as `DEFINITE`."""
+    probability = p.with_logarithm
+    power = p.powers[np.argmax(probability, axis=-1)]
+    return np.where(np.max(probability, axis=-1) > DEFINITE, power, np.nan)
 
 
 def likely_window(p: Posterior) -> tuple[Integers, Integers]:

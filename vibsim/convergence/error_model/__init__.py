@@ -28,6 +28,8 @@ share, the evidence is a power of one ratio (see `hypotheses.Table`). Six kinds 
 - *alternating*: the sign of the error alternates from level to level;
 - *no expansion*: each row has an unrelated size, down to some level; all finer rows are noise.
 
+In the first three kinds the second term may be h^p times a logarithm, as singularities make it.
+
 Rows coarser than the window have not reached the expansion: each has an unrelated size, at the cost
 `FREE_PENALTY`. Rows finer than the window are noise that grows as the steps shrink. Noise of the predicted size
 costs least, and noise below what the expansion would leave there is improbable (`rows.Rows.outside`).

@@ -19,7 +19,7 @@ from vibsim.convergence.error_model.matrices import (
     noise_of_rows,
     outer,
 )
-from vibsim.core.array_types import Floats, Integers
+from vibsim.core.array_types import Flags, Floats, Integers
 from vibsim.elementary import on_arrays
 
 SHARES_PER_GROUP = 5
@@ -28,12 +28,16 @@ SHARES_PER_GROUP = 5
 
 @dataclass(frozen=True)
 class Terms:
-    """Hypotheses about the powers of an expansion; arrays of shape (hypothesis,)."""
+    """Hypotheses about the powers of an expansion; arrays of shape (hypothesis,).
+
+    With a logarithm the second term is h^p (1 + log h), h relative to the finest level of the window, and q is p.
+    """
 
     lower: Floats  # p
     higher: Floats  # q; equal to p if there is no second power
     share: Floats  # signed size of the second power relative to the first, at the finest level of the window
     log_prior: Floats
+    has_logarithm: Flags
 
     @property
     def first_of_pairs(self) -> Integers:
@@ -88,25 +92,42 @@ def two_powers(signs: tuple[float, ...], expected: ExpectedOrder | None) -> Term
         return priors.FRACTIONAL_FACTOR if by_theory and (p - order) % 1.0 else 1.0
 
     total, entries = sum(map(relative_prior, powers)), []
-    distances = {distance: relative_prior(order + distance) for distance in priors.DISTANCES}
     for p in powers:
         prior = (1.0 - own_prior) * relative_prior(p) / total + own_prior * (p == order)
         prior *= 1.0 - priors.ANY_POWER_PRIOR
-        entries.append((p, p, 0.0, prior * priors.PURE_PRIOR))
-        pair_prior = prior * (1.0 - priors.PURE_PRIOR) / sum(distances.values())
-        pair_prior /= len(priors.SHARES) * len(signs)
+        entries.append((p, p, 0.0, prior * priors.PURE_PRIOR, 0.0))
+        second_prior = prior * (1.0 - priors.PURE_PRIOR) / len(signs)
+        seconds = {q: relative_prior(order + q - p) for q in _second_powers(p)}
+        pair_prior = second_prior / sum(seconds.values()) / len(priors.SHARES)
         entries += [
-            (p, p + distance, sign * share, pair_prior * distances[distance])
-            for distance, share, sign in product(distances, priors.SHARES, signs)
+            (p, q, sign * share, pair_prior * seconds[q], 0.0)
+            for q, share, sign in product(seconds, priors.SHARES, signs)
         ]
-    lower, higher, share, log_prior = np.array(entries).T
-    return Terms(lower, higher, share, on_arrays.log(log_prior))
+        second_prior *= priors.LOGARITHM_PRIOR * (priors.FRACTIONAL_FACTOR if by_theory else 1.0)
+        entries += [
+            (p, p, sign * share, second_prior / len(priors.LOGARITHM_SHARES), 1.0)
+            for share, sign in product(priors.LOGARITHM_SHARES, signs)
+        ]
+    lower, higher, share, prior, has_logarithm = np.array(entries).T
+    return Terms(lower, higher, share, on_arrays.log(prior), has_logarithm > 0.0)
+
+
+def _second_powers(p: float) -> list[float]:
+    """Return the powers that may stand beside a first power p.
+
+    A power of a singularity, such as 4/3, stands beside twice itself, and beside the whole powers of what is smooth.
+    """
+    usual = [p + distance for distance in priors.DISTANCES]
+    if 2.0 * p % 1.0 == 0.0:
+        return usual
+    return sorted({*usual, 2.0 * p, math.floor(p) + 1.0, math.floor(p) + 2.0})
 
 
 def single_powers(powers: tuple[float, ...]) -> Terms:
     """Return one hypothesis for each power, with equal priors."""
     p = np.array(powers)
-    return Terms(p, p, np.zeros(len(p)), np.full(len(p), -on_arrays.log(len(p))))
+    none = np.zeros(len(p))
+    return Terms(p, p, none, np.full(len(p), -on_arrays.log(len(p))), none > 0.0)
 
 
 def _level_errors(terms: Terms, sizes: Floats) -> tuple[Floats, Floats, Floats]:
@@ -118,6 +139,8 @@ def _level_errors(terms: Terms, sizes: Floats) -> tuple[Floats, Floats, Floats]:
     second = np.where(
         terms.share[:, None] == 0.0, 0.0, on_arrays.power(sizes, terms.higher[:, None])
     )
+    logarithm = on_arrays.log(np.where(sizes > 0.0, sizes, 1.0))
+    second *= 1.0 + np.where(terms.has_logarithm[:, None], logarithm, 0.0)
     return first, second, first**2 + (terms.share[:, None] * second) ** 2
 
 

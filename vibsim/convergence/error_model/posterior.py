@@ -33,7 +33,7 @@ from vibsim.elementary import on_arrays
 
 LEFT_OUT = 1e-11
 """Largest part of all evidence that may be skipped: it changes error bounds by less than a digit."""
-MOST_TABLES, MOST_HYPOTHESES = 10, 7300
+MOST_TABLES, MOST_HYPOTHESES = 10, 8400
 """Upper limits of the numbers of tables and of hypotheses on a window."""
 LARGEST_LOG = 600.0
 """Log evidence relative to that of no expansion is clipped here, against overflow."""
@@ -56,7 +56,8 @@ class Posterior:
     lowest: Floats  # this is the lowest power that matters, shape (ladder, power)
     highest: Floats  # this is the highest power that matters, shape (ladder, power)
     mixed: Floats  # two powers matter and neither dominates, shape (ladder, pair)
-    pairs: Floats  # these two powers, shape (pair, 2)
+    # these two powers, shape (pair, 2); both are the same if the second one has a logarithm
+    pairs: Floats
     window: Floats  # the expansion holds in this window, shape (ladder, window)
     alternating: Floats  # the sign of the error alternates from level to level
     scattered: Floats  # there is neither an expansion nor noise alone
@@ -70,6 +71,15 @@ class Posterior:
     def expansion(self) -> Floats:
         """Return the probability of an expansion in one or two powers."""
         return np.asarray(np.sum(self.window, axis=-1))
+
+    @property
+    def with_logarithm(self) -> Floats:
+        """Return the probabilities of a power and the same power times a logarithm, shape (ladder, power)."""
+        lower, higher = self.pairs.T
+        sums = np.zeros_like(self.dominant)
+        for pair in np.flatnonzero(lower == higher):
+            sums[:, np.searchsorted(self.powers, lower[pair])] += self.mixed[:, pair]
+        return sums
 
     def some(self, subset: Integers) -> Posterior:
         """Return the posterior of a subset of the ladders."""
@@ -277,6 +287,8 @@ class _Sum:
         grid, total, first_of_pairs = self.grid, self.total, self.terms.first_of_pairs
         pairs, first, second = np.moveaxis(self.pairs / total[:, None, None], 1, 0)
         lower, higher = self.terms.lower[first_of_pairs], self.terms.higher[first_of_pairs]
+        # a power times a logarithm is no order of its own
+        second = np.where(lower == higher, 0.0, second)
         mixed = pairs - first - second
         dominant = self.any_power / total[:, None]
         dominant = dominant + grid.sum_by_power(first, lower) + grid.sum_by_power(second, higher)

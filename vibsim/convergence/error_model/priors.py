@@ -31,6 +31,9 @@ DISTANCES = (0.5, 1.0, 2.0)  # second power minus first power [expansion]
 PURE_PRIOR = 0.3  # prior that no second power is visible [chosen]
 # Size of the second power relative to the first, at the finest level of a window. [chosen]
 SHARES = tuple(10.0 ** (-4.25 + 0.5 * k) for k in range(15))
+# Prior that the second term is the first power times a logarithm, as singularities make it, and its sizes relative to
+# the first term, if h grows by the factor e from the finest level on. [chosen]
+LOGARITHM_PRIOR, LOGARITHM_SHARES = 0.01, SHARES[4:9]
 DOMINATES = 0.1  # a power dominates if every other one is less than this part of it [chosen]
 LEAST_SIGNAL = 0.1  # least mean square of both powers, over that expected of the first [chosen]
 LONGEST_WINDOW = 11  # rows; halving from one step reaches round-off in as many [chosen]

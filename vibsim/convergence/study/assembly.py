@@ -82,6 +82,7 @@ def verdict(
         interpolation=(common.kind, common.interpolation_order or 0) if hidden else None,
         is_contradicted=outcome.is_contradicted,
         is_growing=outcome.is_growing,
+        logarithm=_or_none(outcome.logarithm),
         are_sizes_rounded=_order_shift(outcome, h) > ORDER_TOLERANCE,
         notes=(*common.notes, *_interpolated_linearly(common, reason)),
         parts=(*common.parts, *_left_out(outcome), *_rounding(outcome)),

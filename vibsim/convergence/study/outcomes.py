@@ -103,6 +103,8 @@ class Outcome:
     """Whether finer levels contradict that order."""
     is_growing: bool = False
     """Whether levels without an order differ far more at the finest step than before, so that they show no limit."""
+    logarithm: float = np.nan
+    """Power that a logarithm multiplies in the error; NaN if the levels do not show one."""
     left_out: int = 0
     """Number of finite levels that the verdict leaves out because their step sizes are close to those of others."""
     error: float = np.nan
@@ -381,6 +383,7 @@ def _decide(
     outcome.low, outcome.high = float(assessment.low[k]), float(assessment.high[k])
     outcome.is_contradicted = bool(assessment.contradicted[k])
     outcome.is_growing = not outcome.order >= LEAST_WITH_LIMIT and _grow(outcome)
+    outcome.logarithm = float(assessment.logarithm[k])
     halves = request.halves(judged_values, places)
     outcome.half = float(halves[-1])
     if np.isfinite(weights).all():

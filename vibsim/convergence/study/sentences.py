@@ -42,6 +42,8 @@ class Setting:
     """Whether levels finer than those of the order contradict it."""
     is_growing: bool = False
     """Whether levels without an order differ far more at the finest step than before."""
+    logarithm: float | None = None
+    """The power that a logarithm multiplies in the error, if the levels show one."""
     are_sizes_rounded: bool = False
     """Whether the rounding of the sizes may change the order by more than the tolerance."""
     notes: tuple[str, ...] = ()
@@ -102,6 +104,11 @@ SENTENCES: Mapping[str, tuple[str, str]] = MappingProxyType(
             "they differ by more than the levels before them.",
             "Check the step size, the last step and the input of the finest runs. If they are right, {finer}.",
         ),
+        "logarithm": (
+            "The levels of {quantity} fit an error like {term} log {size}, as singularities leave it. Its "
+            "order{estimate} comes near {power} only slowly.",
+            "Remove the singularity, or expect a lower order. Finer levels hardly change this order.",
+        ),
         "growing": (
             "The differences of {quantity} grow towards the finer levels{estimate}.",
             "Check that {size} is a step size, not a number of cells or steps, and that each level has its own. If so, "
@@ -134,6 +141,8 @@ SENTENCES: Mapping[str, tuple[str, str]] = MappingProxyType(
 """Templates of sentence and advice by the reasons that levels alone show. ``interpolation`` is the only case of
 ``not_applicable``; ``rounded`` and ``contradicted`` are cases of ``pre_asymptotic``, and ``growing`` and ``blown_up``
 are cases of this and of ``round_off``."""
+``not_applicable``; ``rounded``, ``contradicted`` and ``logarithm`` are cases of ``pre_asymptotic``, and ``growing`` is
+one of this and of ``round_off``."""
 
 
 def describe(facts: LadderVerdict, setting: Setting) -> tuple[str, str]:
@@ -145,6 +154,8 @@ def describe(facts: LadderVerdict, setting: Setting) -> tuple[str, str]:
         key = "contradicted"
     elif key == "pre_asymptotic" and setting.are_digits_few:
         key = "rounded"
+    elif key == "pre_asymptotic" and setting.logarithm is not None:
+        key = "logarithm"
     phrases = _phrases(facts, setting)
     is_moved = key == "pre_asymptotic" or bool(_higher_part(facts))
     sentence, advice = (template.format_map(phrases) for template in SENTENCES[key])
@@ -154,6 +165,7 @@ def describe(facts: LadderVerdict, setting: Setting) -> tuple[str, str]:
             facts.reason, facts.order, facts.expected if facts.at_least is None else facts.at_least
         ),
         "" if key in ("contradicted", "blown_up") else _interval(facts),
+        "" if key in ("contradicted", "logarithm") else _interval(facts),
         _error(facts),
         _best(facts),
         _together(setting),
@@ -212,10 +224,13 @@ def _phrases(facts: LadderVerdict, setting: Setting) -> dict[str, Any]:
         if setting.are_digits_few
         else f"compute {facts.quantity} with less noise"
     )
+    power = f"{setting.logarithm:g}" if setting.logarithm else ""
     points = "Take levels that have the coarsest points in common (restrict: subset)"
     return {
         "quantity": facts.quantity,
         "order": order_with_interval(facts),
+        "power": power,
+        "term": facts.size_name if power == "1" else f"{facts.size_name}^{power}",
         "last_used": number(facts.h_used[-1], 6) if facts.h_used else "",
         "as_expected": as_expected,
         "wanted": wanted,
@@ -283,7 +298,9 @@ def _interval(facts: LadderVerdict) -> str:
         return ""
     if facts.order_high - facts.order_low < ORDER_TOLERANCE:
         return f"They fit order {facts.order_low:.2f} alone, but may do so by accident."
-    return f"They are consistent with orders from {facts.order_low:.2f} to {facts.order_high:.2f}."
+    # an order just below 0 is 0
+    low = round(facts.order_low, 2) + 0.0
+    return f"They are consistent with orders from {low:.2f} to {facts.order_high:.2f}."
 
 
 def _finer(facts: LadderVerdict) -> str:
