@@ -139,10 +139,8 @@ SENTENCES: Mapping[str, tuple[str, str]] = MappingProxyType(
     }
 )
 """Templates of sentence and advice by the reasons that levels alone show. ``interpolation`` is the only case of
-``not_applicable``; ``rounded`` and ``contradicted`` are cases of ``pre_asymptotic``, and ``growing`` and ``blown_up``
-are cases of this and of ``round_off``."""
-``not_applicable``; ``rounded``, ``contradicted`` and ``logarithm`` are cases of ``pre_asymptotic``, and ``growing`` is
-one of this and of ``round_off``."""
+``not_applicable``; ``rounded``, ``contradicted`` and ``logarithm`` are cases of ``pre_asymptotic``, and ``growing`` and
+``blown_up`` are cases of this and of ``round_off``."""
 
 
 def describe(facts: LadderVerdict, setting: Setting) -> tuple[str, str]:
@@ -164,8 +162,7 @@ def describe(facts: LadderVerdict, setting: Setting) -> tuple[str, str]:
         opposite_part(
             facts.reason, facts.order, facts.expected if facts.at_least is None else facts.at_least
         ),
-        "" if key in ("contradicted", "blown_up") else _interval(facts),
-        "" if key in ("contradicted", "logarithm") else _interval(facts),
+        "" if key in ("contradicted", "blown_up", "logarithm") else _interval(facts),
         _error(facts),
         _best(facts),
         _together(setting),
