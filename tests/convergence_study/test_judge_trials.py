@@ -391,6 +391,14 @@ def test_growth_in_the_window_comes_before_what_contradicts_it() -> None:
     assert "contradict" not in verdict.sentence
 
 
+def test_a_number_that_is_zero_on_all_coarser_levels_tells_of_no_unstable_solver() -> None:
+    """Such as a number of events: the coarse levels see none."""
+    verdict = judge(H, [0.0, 0.0, 0.0, 3.0], order=2)
+    assert (verdict.status, verdict.error, verdict.best) == ("INCONCLUSIVE", None, None)
+    assert "unstable solver" not in verdict.sentence
+    assert "The differences of u grow" in verdict.sentence
+
+
 def test_a_small_difference_by_chance_is_no_growth() -> None:
     """Of noise, and of an error that vanishes at one level."""
     noisy = judge(H, [1.0001, 1.0000, 1.00001, 1.0021], order=2, noise=1e-3)

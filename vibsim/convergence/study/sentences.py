@@ -192,7 +192,7 @@ def _is_growth(facts: LadderVerdict, setting: Setting) -> bool:
 
 def _is_blown_up(facts: LadderVerdict) -> bool:
     *others, finest = (abs(level.value) for level in facts.levels if level.value is not None)
-    return finest > BLOW_UP * max(others)
+    return finest > BLOW_UP * max(others) > 0.0
 
 
 def _joined(parts: Sequence[str]) -> str:
