@@ -40,6 +40,16 @@ EXPERIMENTS: dict[str, dict[str, Any]] = {
         "schemes": [{"kind": "central", "start": "first_order"}, "rk4"],
         "checks": [{"converges": "u", "order": 2}, {"converges": "u", "order": 3}],
     },
+    "a vector of low order": {
+        "model": {
+            "kind": "system",
+            "coordinates": ["x", "y"],
+            "acceleration": {"x": "-x", "y": "-4*y"},
+        },
+        "initial": {"x": 1.0, "y": 1.0},
+        "schemes": ["central"],
+        "checks": [{"converges": "position_vector", "order": 4}],
+    },
     "stability": {
         **SPRING,
         "time": {"end": 200.0},

@@ -167,8 +167,8 @@ def test_an_order_says_behind_which_level_it_is_not_seen() -> None:
 
 
 def test_three_levels_that_may_fall_by_accident_fit_one_order() -> None:
-    verdict = judge(H[:3], [1 + x ** (1 / 3) for x in H[:3]], order=1 / 3)
-    assert "They fit order 0.33 alone, but may do so by accident." in verdict.sentence
+    verdict = judge(H[:3], [1 + x**0.35 for x in H[:3]], order=0.35)
+    assert "They fit order 0.35 alone, but may do so by accident." in verdict.sentence
 
 
 @pytest.mark.parametrize("h", [H, H[:3], [0.1, 0.07, 0.03]])

@@ -27,6 +27,7 @@ from vibsim.core.record import Record, Variable
 from vibsim.core.vocabulary import HIGHEST
 from vibsim.experiment import Experiment, storage
 from vibsim.experiment.cost import PART_SAMPLES
+from vibsim.models.base import components
 
 if TYPE_CHECKING:
     from concurrent.futures import Future
@@ -121,6 +122,9 @@ def keep_for_verdicts(
     quantities = [check.converges for check in measured if check.kind == "converges"]
     suffixes = ("observed_order", "formal_order", "coincidence")
     orders = {f"{quantity}_{suffix}" for quantity in quantities for suffix in suffixes}
+    # of a vector of low order, the coordinate with the largest share is named
+    vectors = (components(experiment.model.definition, quantity) for quantity in quantities)
+    orders |= {f"{name}_difference_norm" for names in vectors if len(names) > 1 for name in names}
 
     def is_read(name: str) -> bool:
         of_check = name.startswith(("check_", "corner_")) or is_bound(name) or is_of_parts(name)

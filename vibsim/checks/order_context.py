@@ -123,12 +123,11 @@ class OrderContext:
     @cached_property
     def squares(self) -> dict[str, float]:
         """The squares of the finest differences of all coordinates of a vector; empty for any other quantity."""
-        names = components(self._facts.model, self.quantity)
-        record, norm = self._facts.record, self._facts.record.words("norm").index(TYPICAL_NORM)
-        place = self._facts.scheme, self._facts.case, -1, norm
-        stored = [name for name in names if f"{name}_difference_norm" in record]
-        if len(names) == 1 or len(stored) < len(names):
+        names, record = components(self._facts.model, self.quantity), self._facts.record
+        if len(names) == 1 or not all(f"{name}_difference_norm" in record for name in names):
             return {}
+        norm = record.words("norm").index(TYPICAL_NORM)
+        place = self._facts.scheme, self._facts.case, -1, norm
         return {name: float(record[f"{name}_difference_norm"][place]) ** 2 for name in names}
 
     @cached_property

@@ -195,6 +195,7 @@ def story(**changes: Any) -> _Phrases:
         "tolerance": 0.1,
         "norm": "l2",
         "levels": (4, 5, 6, 7),
+        "squares": {},
         "culprit": -1,
         "omega_dt": float("nan"),
         "growth_in_words": "",
