@@ -8,7 +8,9 @@ import shutil
 import subprocess
 import sys
 from collections.abc import Callable, Iterator
+from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import jsonschema
 import netCDF4
@@ -23,6 +25,7 @@ from vibsim.core import registry
 from vibsim.core.errors import InputError
 from vibsim.engine import integrate
 from vibsim.models import MODELS
+from vibsim.models.base import fault_of
 from vibsim.plan import Choice, build, code_digest, load
 from vibsim.schemes import SCHEMES
 
@@ -300,6 +303,13 @@ def test_a_package_at_fault_is_named_with_its_entry_point(
     kinds = {line.split()[0] for line in listed.splitlines()}
     assert {"models": {"spring", "duffing"}, "schemes": {"rk4", "lsoda"}}[group] <= kinds
     assert "mine" not in kinds
+
+
+def test_an_exact_motion_may_be_known_for_some_initial_values_alone() -> None:
+    def from_rest(t: Any, initial: Any, parameters: Any) -> Any:
+        raise ValueError("known from rest alone")
+
+    assert fault_of(replace(MODELS["spring"], kind="mine", exact=from_rest)) == ""
 
 
 def test_two_packages_with_one_name_are_both_named(

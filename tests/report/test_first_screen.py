@@ -63,6 +63,8 @@ def test_every_reason_and_every_kind_of_check_has_a_title():
         ({"checks": [{"claim": "dt = 1 is large", "that": {"value": "period", "above": 1.0}}]}, "dt = 1 is large"),
         ({"checks": [{"equal": ["central", "exact"], "quantity": "theta", "atol": 1.0}, {"stable": True}]},
          "Scheme central is stable, as expected"),
+        ({"schemes": ["central", "rk4"], "checks": [{"stable": False, "schemes": ["central"]}]},
+         "The amplitude does not grow, against what is asked"),
         ({"checks": [{"claim": "so", "that": {"value": "period", "above": 1.0}, "holds": False}]},
          "Not shown to be false: So"),
         ({"checks": [{"claim": "so", "that": {"value": "period", "below": 1.0}}]}, "Not confirmed: So"),

@@ -57,7 +57,7 @@ MATCHED = {
 MISSED = {
     "value": "{Subject} is not as expected",
     "accurate": "{What} is not as accurate as asked",
-    "stable": "{Schemes} {not_stability}",
+    "stable": "The amplitude {grows}, against what is asked",
     "conserves": "Not as asked: that the energy {drift}",
     "equal": "{What} by {first} differs from {second}",
     "tolerance": "The error bound is beyond the tolerance",
@@ -194,7 +194,7 @@ def _phrases(lead: CheckedLadder) -> dict[str, str]:
         "converges": "tends to zero" if plain_name(lead.quantity) == "energy_deviation" else "converges",
         "at": _at(expected, order), **_contrast(order, expected),
         "Schemes": f"Scheme {judged[0]}" if len(judged) == 1 else "The schemes",
-        "first": "", "second": "", "drift": "", "stability": "", "not_stability": "", "subject": "", "Subject": "",
+        "first": "", "second": "", "drift": "", "stability": "", "grows": "", "subject": "", "Subject": "",
     }  # fmt: skip
     if measured is None:
         return filled
@@ -211,8 +211,8 @@ def _phrases(lead: CheckedLadder) -> dict[str, str]:
             outcomes = ["is stable", "makes the amplitude grow"]
             if len(judged) > 1:
                 outcomes = ["are stable", "make the amplitude grow"]
-            expected, opposite = outcomes if measured.stable else outcomes[::-1]
-            filled |= {"stability": expected, "not_stability": f"{opposite}, against what is asked"}
+            grows = "grows" if measured.stable else "does not grow"
+            filled |= {"stability": outcomes[not measured.stable], "grows": grows}
     if _has_several_orders(lead):
         filled["at"] = "at the order that its scheme promises"
         if (count := len(judged)) > 1:
