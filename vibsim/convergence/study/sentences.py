@@ -162,7 +162,7 @@ def describe(facts: LadderVerdict, setting: Setting) -> tuple[str, str]:
         opposite_part(
             facts.reason, facts.order, facts.expected if facts.at_least is None else facts.at_least
         ),
-        "" if key in ("contradicted", "blown_up", "logarithm") else _interval(facts),
+        "" if key in ("contradicted", "growing", "blown_up", "logarithm") else _interval(facts),
         _error(facts),
         _best(facts),
         _together(setting),
