@@ -50,6 +50,21 @@ EXPERIMENTS: dict[str, dict[str, Any]] = {
         "schemes": ["central"],
         "checks": [{"converges": "position_vector", "order": 4}],
     },
+    "a fall into an infinite force": {
+        "model": {"kind": "oscillator", "spring": "1/u**2", "potential": "-1/u"},
+        "initial": {"u": 1.0},
+        "time": {"end": 1.2},
+        "levels": [5, 6, 7, 8, 9],
+        "checks": [{"converges": "u", "order": 4}],
+    },
+    "levels that differ in their events": {
+        "model": {"kind": "oscillator", "spring": "u", "force": "cos(t)"},
+        "events": [{"when": "u - 3.9568636857938907", "rising": True, "then": {"v": "-0.8*v"}}],
+        "initial": {"u": 0.0},
+        "time": {"end": 13.14, "base_steps": 32},
+        "levels": [0, 1, 2, 3],
+        "checks": [{"value": "event_count", "equals": 1}],
+    },
     "stability": {
         **SPRING,
         "time": {"end": 200.0},

@@ -108,7 +108,7 @@ def _in_parallel(
 
 _ALWAYS_READ = (
     *("status", "failure_time", "last_step", "omega_dt", "stability_limit", "measured_growth"),
-    *("decay_rate", "pulse_time", "pulse_width", HIGHEST),
+    *("decay_rate", "pulse_time", "pulse_width", HIGHEST, "event_count", "last_event_time"),
 )
 """Variables that any verdict or the summary may read, besides those of its own check and quantity."""
 
@@ -121,14 +121,22 @@ def keep_for_verdicts(
     measured = [check.measured for check in experiment.checks]
     quantities = [check.converges for check in measured if check.kind == "converges"]
     suffixes = ("observed_order", "formal_order", "coincidence")
-    orders = {f"{quantity}_{suffix}" for quantity in quantities for suffix in suffixes}
-    # of a vector of low order, the coordinate with the largest share is named
-    vectors = (components(experiment.model.definition, quantity) for quantity in quantities)
-    orders |= {f"{name}_difference_norm" for names in vectors if len(names) > 1 for name in names}
+    of_orders = {f"{quantity}_{suffix}" for quantity in quantities for suffix in suffixes}
+    if quantities:
+        # of a vector of low order, the coordinate with the largest share is named
+        model = experiment.model.definition
+        vectors = (components(model, quantity) for quantity in quantities)
+        of_orders |= {
+            f"{name}_difference_norm" for names in vectors if len(names) > 1 for name in names
+        }
+        # where levels part, their largest speeds tell whether a force becomes infinite
+        of_orders |= {
+            f"{velocity}_{end}" for velocity in model.velocities for end in ("min", "max")
+        }
 
     def is_read(name: str) -> bool:
         of_check = name.startswith(("check_", "corner_")) or is_bound(name) or is_of_parts(name)
-        return of_check or name in _ALWAYS_READ or name in orders
+        return of_check or name in _ALWAYS_READ or name in of_orders
 
     for part in parts:
         attrs = {**part.attrs, UNITS: json.dumps(units_in(part))}
