@@ -338,12 +338,11 @@ def _fault_of_exact(model: Model, parameters: Numbers) -> str:
                 return f"its exact(t, initial, parameters) returns no {missing[0]}"
         if model.exact_period is not None:
             np.asarray(model.exact_period(initial, parameters), dtype=float)
-    except (KeyError, TypeError) as error:
-        rule = "its exact(t, initial, parameters) or exact_period(initial, parameters) fails"
-        return f"{rule} where every initial value is 1: {type(error).__name__}: {error}"
-    except Exception:
-        # it may be known for other initial values alone
-        return ""
+    except Exception as error:
+        # any other error may mean that it is known for other initial values alone
+        if isinstance(error, (KeyError, TypeError)):
+            rule = "its exact(t, initial, parameters) or exact_period(initial, parameters) fails"
+            return f"{rule} where every initial value is 1: {type(error).__name__}: {error}"
     return ""
 
 
