@@ -15,6 +15,7 @@ FACTS = {"order": 2.002, "order_low": 2.0, "order_high": 2.0023, "relative_error
 def check(name: str = "order", status: str = "PASS", **more: Any) -> dict[str, Any]:
     return {
         "id": name,
+        "kind": "converges",
         "status": status,
         "reason": "asymptotic" if status == "PASS" else "order_low",
         "quantity": "theta",
@@ -81,6 +82,11 @@ def test_a_trap_gives_the_headline_only_where_nothing_else_does() -> None:
     trap = check("trap", expected="FAIL (order_low)", quantity="omega")
     assert "theta: " in outcome_text.headline(entry(trap, check()), 99)
     assert "omega: " in outcome_text.headline(entry(trap), 99)
+    # a claim that is true is expected to be "true"
+    number = check(
+        "claim", kind="claim", expected="true", results=[{"facts": {}}], text="It is 28."
+    )
+    assert outcome_text.headline(entry(trap, number), 99) == "It is 28."
 
 
 @pytest.mark.parametrize(

@@ -9,7 +9,7 @@ from typing import Any
 from vibsim.cli.terminal import clean, painted
 from vibsim.core.decimals import order_interval
 from vibsim.core.set_option import set_options
-from vibsim.core.vocabulary import SEVERITY
+from vibsim.core.vocabulary import SEVERITY, is_trap
 
 Entry = Mapping[str, Any]
 """The summary of an experiment, or an entry with an ``error`` in its place; or one of its checks; or a failed job."""
@@ -82,15 +82,12 @@ def checks(rows: Sequence[Entry], columns: int) -> Iterator[str]:
 
 
 def decisive(rows: Sequence[Entry]) -> Entry | None:
-    """Return the worst check; if all passed, one with an order, and sooner one that is meant to pass; None of none."""
-    if not rows:
-        return None
-    worst = max(rows, key=lambda row: SEVERITY[row["status"]])
-    if worst["status"] != "PASS":
-        return worst
-    # checks that are meant to pass tell more than checks that are meant to fail
-    plain = [row for row in rows if row["expected"] == "PASS"] or rows
-    return next(filter(numbers, plain), plain[0])
+    """Return the worst check; of equals one that is no trap, then one with an order, then the first; None of none."""
+
+    def rank(row: Entry) -> tuple[int, bool, bool]:
+        return -SEVERITY[row["status"]], is_trap(row), not numbers(row)
+
+    return min(rows, key=rank, default=None)
 
 
 def headline(entry: Entry, columns: int) -> str:

@@ -78,6 +78,13 @@ def decisive_number(facts: Mapping[str, Any]) -> float | None:
     return None if DECISIVE["converges"] in facts else number
 
 
+def is_trap(check: Mapping[str, Any]) -> bool:
+    """Return whether a check of a summary expects a failure, or a claim to be false."""
+    if check["kind"] == "claim":
+        return bool(check["expected"] == "false")
+    return str(check["expected"]).startswith(("FAIL", "INCONCLUSIVE"))
+
+
 FORMAT = 2
 """Version of the file format, ``vibsim_format`` in every file."""
 

@@ -17,6 +17,7 @@ from vibsim.core.vocabulary import (
     TYPICAL_NORM,
     VECTORS,
     is_error_part,
+    is_trap,
     plain_name,
     whole_of,
 )
@@ -153,13 +154,6 @@ def marks(checks: Sequence[Mapping[str, Any]]) -> list[tuple[str, int]]:
     """Return the `MARKS` of checks, each with its number of checks."""
     badges = [badge(check) for check in checks]
     return [(mark, badges.count(mark)) for mark in MARKS if mark in badges]
-
-
-def is_trap(check: Mapping[str, Any]) -> bool:
-    """Return whether a check of a summary expects a failure, or a claim to be false."""
-    if check["kind"] == "claim":
-        return bool(check["expected"] == "false")
-    return str(check["expected"]).startswith(("FAIL", "INCONCLUSIVE"))
 
 
 def broken(summary: Mapping[str, Any]) -> int:

@@ -11,7 +11,7 @@ from urllib.parse import quote
 
 from vibsim import store
 from vibsim.core.errors import FileError
-from vibsim.core.vocabulary import SEVERITY, worst
+from vibsim.core.vocabulary import SEVERITY, is_trap, worst
 from vibsim.experiment import citation
 from vibsim.experiment.collection import ADHOC, SITE
 from vibsim.report import words
@@ -181,7 +181,7 @@ def headline(checks: Sequence[Mapping[str, Any]]) -> Headline:
     """
     ranked = sorted(checks, key=lambda check: -SEVERITY[check["status"]])
     found = [(check, _decides(check)) for check in ranked]
-    wanted = [(check, result) for check, result in found if not words.is_trap(check)]
+    wanted = [(check, result) for check, result in found if not is_trap(check)]
     for _, result in wanted:
         order, relative = (words.fact(result, name) for name in ("order", "relative_error"))
         if result.get("status") == "INCONCLUSIVE":

@@ -6,8 +6,8 @@ from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any
 
+from vibsim.core.vocabulary import is_trap
 from vibsim.experiment import citation
-from vibsim.report import words
 from vibsim.report.tables.source_figures import order
 
 CORRECTION = "correction of the "
@@ -57,7 +57,7 @@ def _statement(
     check: Mapping[str, Any], source: Mapping[str, str | None], name: str, link: str
 ) -> Statement:
     is_ours = str(source["text"]).startswith(CORRECTION)
-    badge = CORRECTED if is_ours or words.is_trap(check) else CONFIRMED
+    badge = CORRECTED if is_ours or is_trap(check) else CONFIRMED
     return Statement(
         citation.place(source) if source["section"] else "",
         "What is right: " * is_ours + str(check["text"]).removeprefix("Claim: "),
