@@ -17,6 +17,7 @@ from vibsim.core.errors import Fault, InputError, SimulationError
 from vibsim.experiment import canonical
 from vibsim.models import MODELS, Damping, Model, Parameter, State
 from vibsim.schemes import SCHEMES, Flag, Scheme, Stepper
+from vibsim.schemes.code_generation import self_starting
 from vibsim.schemes.orders import same_orders
 from vibsim.schemes.runge_kutta import Tableau, from_tableau
 
@@ -254,3 +255,34 @@ def test_a_model_with_damping_is_told_how_to_declare_it() -> None:
     assert "write damping=Damping(kind, rate) in the model" in fault.hint
     declared = replace(damped, damping=Damping("linear", "mu"))
     assert build(model=declared, schemes=["central"]).schemes[0].kind == "central"
+
+
+def midpoint(state: Any, t: Any, dt: Any, p: Any, acceleration: Any) -> Any:
+    u, v = state
+    middle = v + 0.498 * dt * acceleration(u, v, t, p)
+    a = acceleration(u + 0.498 * dt * v, middle, t + 0.498 * dt, p)
+    return (u + dt * middle, v + dt * a), v
+
+
+def test_a_promise_above_the_order_of_theory_is_not_believed_where_levels_show_it_by_accident() -> (
+    None
+):
+    """The part of first order is half of that of second order, at right angles to it."""
+    stepper = self_starting(midpoint)
+    wrong = replace(RALSTON, kind="midpoint", stepper=lambda options: stepper)
+    experiment = build(
+        model="oscillator",
+        parameters={
+            "spring": "u",
+            "force": "cos(2*t)",
+            "events": [{"when": "u - 50", "then": {"v": "-v"}}],
+        },
+        initial={"u": 0.0, "v": 1.0},
+        schemes=[wrong],
+        checks=[{"converges": name, "order": 2} for name in "uv"],
+    )
+    found = verdicts(
+        experiment, analyse(experiment, [simulate(experiment, n) for n in (6, 7, 8, 9)])
+    )
+    assert [verdict.status for verdict in found] == ["INCONCLUSIVE", "INCONCLUSIVE"]
+    assert all("midpoint has order 1 on u'' + w^2 u = 0" in verdict.text for verdict in found)

@@ -9,7 +9,8 @@ from thinned import thinned
 from vibsim.engine import integrate
 from vibsim.models import MODELS
 from vibsim.schemes import FIXED_STEP, SCHEMES
-from vibsim.theory import discrete, rounding_bound, stability_limit
+from vibsim.schemes.base import LOW_STARTS
+from vibsim.theory import discrete, orders, rounding_bound, stability_limit
 
 SPRING = MODELS["spring"]
 
@@ -155,3 +156,11 @@ def test_the_last_velocity_follows_the_rule_of_the_scheme(end):
         "kick": (u[11] - u[9]) / 0.6,
     }
     np.testing.assert_allclose(v[10], wanted[end], rtol=1e-14)
+
+
+@pytest.mark.parametrize(("scheme", "options"), VARIANTS)
+def test_the_order_on_the_oscillator_is_the_promised_one(scheme, options):
+    # such a start makes everything of first order; what a scheme promises is with a sound one
+    is_sound = options.get("start") not in LOW_STARTS
+    promised = (scheme.formal_order(name, SPRING, options) if is_sound else 1.0 for name in "uv")
+    assert orders(scheme.stepper(options)) == tuple(promised)

@@ -19,8 +19,9 @@ from vibsim.experiment import Experiment
 from vibsim.experiment.sweep_columns import Columns, by_options, option_groups, recorded_columns
 from vibsim.formula import values
 from vibsim.models import tree
+from vibsim.models.base import components
 from vibsim.models.shared.free import free_oscillation, why_not_free
-from vibsim.schemes import Options, Scheme
+from vibsim.schemes import FIXED_STEP, Options, Scheme
 from vibsim.schemes.base import ORDER_AT_CORNERS, is_on_the_mesh
 from vibsim.schemes.orders import Beginning, depends_on_velocity, is_autonomous
 from vibsim.simulation.members import numbers_of
@@ -177,6 +178,25 @@ def special_orders(experiment: Experiment, quantity: str, columns: Columns) -> F
         return math.nan if has_mesh else scheme.special_order(options)
 
     return by_options(experiment, columns, special)
+
+
+def orders_on_oscillator(experiment: Experiment, quantity: str, columns: Columns) -> Floats:
+    """Return the order of every scheme on ``u'' + w^2 u = 0``, shape (scheme, 1 or case); infinite where not computed.
+
+    No scheme has a higher order on models in general. Only positions and velocities of schemes that do not come with
+    vibsim are computed: tests compare the promises of the others with theory.
+    """
+    model = experiment.model.definition
+    of_which = components(model, quantity)[0]
+    if of_which not in (*model.positions, *model.velocities):
+        return np.full((len(experiment.schemes), 1), np.inf)
+
+    def on_oscillator(scheme: Scheme, options: Options) -> float:
+        if scheme.adaptive or FIXED_STEP.get(scheme.kind) is scheme:
+            return math.inf
+        return theory.orders(scheme.stepper(options))[int(of_which in model.velocities)]
+
+    return by_options(experiment, columns, on_oscillator)
 
 
 def orders_vary(experiment: Experiment, quantity: str) -> bool:

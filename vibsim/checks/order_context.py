@@ -10,7 +10,12 @@ import numpy as np
 
 from vibsim import theory
 from vibsim.apriori.force_discontinuities import words_of
-from vibsim.apriori.formal_orders import is_promised, orders_in, special_orders
+from vibsim.apriori.formal_orders import (
+    is_promised,
+    orders_in,
+    orders_on_oscillator,
+    special_orders,
+)
 from vibsim.apriori.table_corners import is_on_a_point
 from vibsim.checks.accurate import error_in_words
 from vibsim.checks.phase_amplitude_text import parts_in_words
@@ -84,6 +89,8 @@ class OrderContext:
         columns = recorded_columns(record)
         self.special = f.of_member(special_orders(experiment, quantity, columns))
         """Its highest order in a special case of motion, model or options."""
+        self.on_oscillator = f.of_member(orders_on_oscillator(experiment, quantity, columns))
+        """Its order on the linear oscillator if it does not come with vibsim, else infinite."""
         self.expected = self.promised if check.order == "scheme" else float(check.order)
         """The expected order; infinite for exactness."""
         self.parts = parts_in_words(f, quantity, self.expected)

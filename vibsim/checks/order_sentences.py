@@ -220,14 +220,16 @@ DIAGNOSES: Words = {
         "Measure with `norm: linf_interior`{or_kick}.",
     ),
     "order_low, one_quantity": (
-        " Another state has the expected order, so the cause is how {what} is computed, not the step.",
+        " Another state has the expected order, so the cause is how {what} is computed, not the step."
+        "{in_theory}",
         "Look for a formula of lower order that only {what} uses{or_expect}.",
     ),
     "order_low, everything": (
-        " Every state shows this at every time, so the cause is the step of scheme {scheme}, its start or the force.",
+        " Every state shows this at every time, so the cause is the step of scheme {scheme}, its start or the "
+        "force.{in_theory}",
         "Look for a term of lower order in scheme {scheme}{or_expect}.",
     ),
-    "order_low": ("", "Look for a term of lower order in scheme {scheme}{or_expect}."),
+    "order_low": ("{in_theory}", "Look for a term of lower order in scheme {scheme}{or_expect}."),
     "order_high, promise": (
         " Scheme {scheme} promises order {promised} here.",
         "Set `order: scheme`.",

@@ -308,11 +308,23 @@ class _Phrases(OrderContext):
 
     def hidden(self) -> str:
         """Say which promised power may dominate on finer levels, as near a special case; empty if there is none."""
+        if self.on_oscillator < self.promised:
+            return self.in_theory()
         if not self.promised + HALF_SPACING < min(self.order, self.special):
             return ""
         return (
             f" Scheme {self.scheme} has an error of order {self.notation.number(self.promised)} here, which may still "
             "be too small to see. Finer levels decide."
+        )
+
+    def in_theory(self) -> str:
+        """Say which lower order theory finds than the scheme promises; empty if none."""
+        if not self.on_oscillator < self.promised:
+            return ""
+        found, promised = map(self.notation.number, (self.on_oscillator, self.promised))
+        return (
+            f" Scheme {self.scheme} has order {found} on u'' + w^2 u = 0 in exact arithmetic, not {promised} as it "
+            "promises."
         )
 
     def likely(self) -> float:

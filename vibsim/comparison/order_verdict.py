@@ -165,7 +165,7 @@ def facts_of(q: Comparison, norm: str, order: Floats, tolerance: float) -> Ladde
         size=size * weight,
         scale=q.scale * weight,
         blur=q.blur * weight[:, None],
-        promised=all_cases(q.order),
+        promised=all_cases(q.lowest),
         special=all_cases(q.special),
         combined=partial(q.combined, norm),
         numbers=q.are_numbers,

@@ -9,7 +9,11 @@ from itertools import pairwise
 
 import numpy as np
 
-from vibsim.apriori.formal_orders import even_powers, special_orders
+from vibsim.apriori.formal_orders import (
+    even_powers,
+    orders_on_oscillator,
+    special_orders,
+)
 from vibsim.comparison import thresholds as th
 from vibsim.comparison.rescaled_differences import coincidence
 from vibsim.convergence import differences
@@ -71,6 +75,12 @@ class Comparison:
     def special(self) -> Floats:
         """Highest order of the scheme in a special case, shape (scheme, 1 or case)."""
         return special_orders(self.block.experiment, self.name, self.block.columns)
+
+    @cached_property
+    def lowest(self) -> Floats:
+        """The promised order, or that of the scheme on the linear oscillator if that is lower; as `order`."""
+        found = orders_on_oscillator(self.block.experiment, self.name, self.block.columns)
+        return np.where(np.isfinite(self.order), np.fmin(self.order, found), self.order)
 
     @cached_property
     def differences(self) -> list[Floats]:

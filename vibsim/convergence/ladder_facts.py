@@ -33,7 +33,8 @@ class LadderFacts:
     scale: Floats  # norm of the whole that the quantity is a part of, such as the energy
     error: Floats  # norm of the true error of the finest level; NaN if unknown
     blur: Floats  # measurement error of each level, without rounding, shape (..., n)
-    promised: Floats  # order that the scheme promises; infinite for exactness, NaN for none
+    # Order that the scheme promises, or a lower one that theory finds; infinite for exactness, NaN for none.
+    promised: Floats
     special: Floats  # highest order of the scheme in a special case
     combined: Callable[[Flags, int, Floats], Floats]  # norms of weighted sums of differences
     numbers: Flags  # whether the series are single numbers, of at most two points

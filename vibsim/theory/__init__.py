@@ -5,7 +5,7 @@ everything else follows from the resulting matrix. On polynomials, `vibsim.theor
 """
 
 from vibsim.theory.degrees import Miss, Residual, exact_degree, fitted_force, miss, reproduces
-from vibsim.theory.discrete import discrete
+from vibsim.theory.discrete import discrete, orders
 from vibsim.theory.phase_amplitude import part_orders
 from vibsim.theory.roots import (
     Amplification,
@@ -29,6 +29,7 @@ __all__ = [
     "exact_degree",
     "fitted_force",
     "miss",
+    "orders",
     "part_orders",
     "phase_error_per_period",
     "reproduces",

@@ -10,16 +10,27 @@ Source: vibration text (B), section 4.2, equation (20); section 5.6, equations (
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from vibsim.core.array_types import Floats, Integers
+from vibsim.elementary import on_arrays
 from vibsim.schemes.base import Stepper
 from vibsim.theory.doubled import Doubled, doubled, product
 from vibsim.theory.roots import Amplification, amplification
 
+HALVINGS = 4, 25
+"""Numbers of halvings of the time 1 that give the steps of `orders`. [convention]"""
+START, END = (1.0, 0.3), np.ones(1)
+"""Position and velocity at t = 0 for `orders`, and the time of their errors. [convention]"""
+LEAST_ERROR = 1e-13
+"""Smaller errors may be rounding of the coefficients of a scheme. [convention]"""
+NEARLY = 0.1
+"""An order this close below a whole number is that number. [convention]"""
 _BITS = 5
 """Bits of n per multiplication if there are many n."""
 _AT_ONCE = 2**15
@@ -76,6 +87,31 @@ def discrete(
             v[:, flat == steps] = end[:, None]
     shape = members[0].shape + np.shape(n)
     return u.reshape(shape), v.reshape(shape)
+
+
+@lru_cache(maxsize=1024)
+def orders(stepper: Stepper) -> tuple[float, float]:
+    """Return the orders of position and velocity on ``u'' + u = 0``, whole numbers; infinite where nothing is wrong.
+
+    They are read where steps are as short as errors above rounding allow, for a start that is no special one. An order
+    is 0 if the scheme does not converge.
+    """
+    halvings = np.arange(*HALVINGS)
+    found = discrete(stepper, 1.0, 2.0**-halvings, *START, 2**halvings)
+    cosine, sine = on_arrays.cos(END), on_arrays.sin(END)
+    exact = START[0] * cosine + START[1] * sine, START[1] * cosine - START[0] * sine
+    position, velocity = (_order(np.diagonal(x) - y) for x, y in zip(found, exact, strict=True))
+    return position, velocity
+
+
+def _order(errors: Floats) -> float:
+    """Return the order of errors that halved steps leave, from the last two before they come down to rounding."""
+    sizes = np.abs(errors)
+    end = np.append(np.flatnonzero(~(sizes > LEAST_ERROR)), len(sizes))[0]
+    if end < 2:
+        return math.inf
+    order = on_arrays.log2(sizes[end - 2 : end - 1] / sizes[end - 1])
+    return float(np.maximum(np.floor(order + NEARLY), 0.0)[0])
 
 
 def first_state(parts: Amplification, dt: Floats, u_0: Floats, v_0: Floats) -> Doubled:
