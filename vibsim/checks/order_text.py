@@ -29,6 +29,8 @@ UNEVEN_SPEEDS = 2.0
 chaotic motion are alike."""
 LAST_ORDERS = 4
 """Number of the last orders that are reported."""
+HARDLY = 0.1
+"""Share of the distance to the order where estimates should go; if they move by less, they do not go there."""
 NEAR_DUE = 0.3
 """The trend of orders this near to their goal is not reported."""
 BACKWARD_DAMPING = "central_backward_damping"
@@ -298,6 +300,8 @@ class _Phrases(OrderContext):
             return f", which is above {goal}{why}" if is_above else ""
         listed = ", ".join(f"{order:.2f}" for order in known)
         start = ". From level to level the estimates"
+        if abs(known[-1] - known[-2]) < HARDLY * abs(known[-1] - due):
+            return f"{start} hardly change ({listed})"
         steps = {math.copysign(1.0, b - a) for a, b in pairwise(known)}
         same_side = all((order > due) == is_above for order in known)
         if len(steps) > 1 or not same_side:

@@ -78,9 +78,10 @@ class Comparison:
 
     @cached_property
     def lowest(self) -> Floats:
-        """The promised order, or that of the scheme on the linear oscillator if that is lower; as `order`."""
+        """The promised order, or that of the scheme on the linear oscillator if that is lower but converges."""
         found = orders_on_oscillator(self.block.experiment, self.name, self.block.columns)
-        return np.where(np.isfinite(self.order), np.fmin(self.order, found), self.order)
+        is_lower = (found >= 1.0) & (found < self.order) & np.isfinite(self.order)
+        return np.where(is_lower, found, self.order)
 
     @cached_property
     def differences(self) -> list[Floats]:
