@@ -286,3 +286,35 @@ def test_a_promise_above_the_order_of_theory_is_not_believed_where_levels_show_i
     )
     assert [verdict.status for verdict in found] == ["INCONCLUSIVE", "INCONCLUSIVE"]
     assert all("midpoint has order 1 on u'' + w^2 u = 0" in verdict.text for verdict in found)
+
+
+def nystrom_too_strong(state: Any, t: Any, dt: Any, p: Any, acceleration: Any) -> Any:
+    """Nystroem's method of order 4 with a force that is 1e-6 too large."""
+    u, v = state
+    a = 1.000001 * acceleration(u, v, t, p)
+    b = 1.000001 * acceleration(u + 0.5 * dt * v + dt * dt / 8.0 * a, v, t + 0.5 * dt, p)
+    c = 1.000001 * acceleration(u + dt * v + dt * dt / 2.0 * b, v, t + dt, p)
+    return (u + dt * v + dt * dt / 6.0 * (a + 2.0 * b), v + dt / 6.0 * (a + 4.0 * b + c)), v
+
+
+def test_bounds_of_best_values_reach_an_exact_solution_that_the_levels_miss() -> None:
+    stepper = self_starting(nystrom_too_strong)
+    wrong = replace(RALSTON, kind="nystrom", stepper=lambda options: stepper, velocity_forces=False)
+    experiment = build(
+        model="pendulum",
+        initial={"theta": 2.0, "omega": 0.2},
+        schemes=[replace(wrong, orders=lambda options: same_orders(4))],
+        checks=[{"value": "end", "quantity": "theta", "at": {"level": "best"}, "below": 1.145125}],
+    )
+    found = analyse(experiment, [simulate(experiment, level) for level in experiment.levels])
+    (verdict,) = verdicts(experiment, found)
+    assert verdict.status == "INCONCLUSIVE"
+    for name in ("theta_end", "theta_min", "omega_max"):
+        value, bound = (
+            float(found[f"{name}_{kind}"]) for kind in ("richardson", "richardson_error")
+        )
+        exact = float(found["theta_exact"].isel(t=-1)) if name == "theta_end" else value
+        assert abs(value - exact) < bound
+        assert bound > 1e-6
+    # an unknown part of a period is of the same origin
+    assert np.isnan(float(found["period_richardson_error"]))

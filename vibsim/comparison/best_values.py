@@ -147,13 +147,15 @@ def _ladder(name: str, place: value_numbers.Place) -> _Ladder:
     if row.rests_on_run:
         missed = missed + _of_run(name, place)
     safety = np.broadcast_to(block.safety(IRREGULAR), size.shape)
+    astray = _of_wrong_limit(name, place)
+    missed = missed + astray
     if row.needs_events:
         # how late an event on the mesh is depends on the mesh by accident
         missed = np.where(np.isnan(block.left_to_the_mesh), missed, np.inf)
     missed = np.where(np.isfinite(block.missed.time) | place.is_open(name), np.inf, missed)
     of_series = np.full((*size.shape, 2), np.nan)
     if row.is_sample and len(place.levels) >= LEVELS_OF_AN_ORDER:
-        of_series = value_numbers.sample_of_series(place)
+        of_series = np.where(astray[..., None] > 0.0, np.nan, value_numbers.sample_of_series(place))
     return _Ladder(place.levels, values, order, even, floor, size, missed, safety, of_series)
 
 
@@ -180,6 +182,19 @@ def _error_of_period(place: value_numbers.Place) -> Floats:
         rate = block.decay + 2.0 * np.pi / period
         error_of_peak = rate * ERROR_OF_LINE * dt**2
         return np.asarray(2.0 * error_of_peak / (count * period))
+
+
+def _of_wrong_limit(name: str, place: value_numbers.Place) -> Floats:
+    """Return the error of a number whose levels approach another solution than the exact one, shape (scheme, case).
+
+    A number in the unit of the solution is off by no more than the solution; any other one by an unknown amount.
+    """
+    own = place.comparison()
+    q = own or place.compared.get(place.block.model.position)
+    distance = np.zeros(place.block.shape) if q is None else q.beyond_the_bound
+    if own is not None and (VALUES[name].is_sample or VALUES[name].measured_by == "points"):
+        return distance
+    return np.where(distance > 0.0, np.inf, 0.0)
 
 
 def _of_run(name: str, place: value_numbers.Place) -> Floats:

@@ -144,6 +144,16 @@ class Comparison:
         # a bound never decreases with time
         return self.extrapolation[1][..., -1]
 
+    @cached_property
+    def beyond_the_bound(self) -> Floats:
+        """Largest distance of the extrapolated series from the exact one; 0 where its bound may allow it."""
+        if self.exact is None:
+            return np.zeros(self.block.shape)
+        with np.errstate(invalid="ignore", over="ignore"):
+            distance = differences.largest(self.extrapolation[0] - self.exact)
+            allowed = th.WRONG_LIMIT * (self.largest_bound + self.blur[..., -1])
+            return np.where(distance > allowed, distance, 0.0)
+
     @property
     def bound_of_length(self) -> Floats:
         """The largest bound over time; for a vector, that of its length."""

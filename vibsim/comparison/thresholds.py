@@ -14,6 +14,8 @@ VANISHING_POINT = 1e-3  # smaller parts of the largest difference count as 0 [co
 SHAPELESS_POINTS = 2  # series that differ at no more points have no shape [derived]
 # Order that extrapolates a quantity promised to be exact: the finest level then stays as it is. [convention]
 EXACT_ORDER = 16.0
+# An extrapolation further from the exact solution than this multiple of its bound has another limit. [convention]
+WRONG_LIMIT = 3.0
 STRAIGHT = 1e-3  # largest second difference of a straight line, over its total change [convention]
 
 # ---- Series over time
