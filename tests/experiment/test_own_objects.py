@@ -311,10 +311,10 @@ def test_bounds_of_best_values_reach_an_exact_solution_that_the_levels_miss() ->
     assert verdict.status == "INCONCLUSIVE"
     for name in ("theta_end", "theta_min", "omega_max"):
         value, bound = (
-            float(found[f"{name}_{kind}"]) for kind in ("richardson", "richardson_error")
+            found[f"{name}_{kind}"].item() for kind in ("richardson", "richardson_error")
         )
-        exact = float(found["theta_exact"].isel(t=-1)) if name == "theta_end" else value
+        exact = found["theta_exact"].isel(t=-1).item() if name == "theta_end" else value
         assert abs(value - exact) < bound
         assert bound > 1e-6
     # an unknown part of a period is of the same origin
-    assert np.isnan(float(found["period_richardson_error"]))
+    assert np.isnan(found["period_richardson_error"].item())
