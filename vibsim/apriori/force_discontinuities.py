@@ -26,7 +26,7 @@ from vibsim.core.record import Record, Variable
 from vibsim.core.vocabulary import MEMBER
 from vibsim.elementary import on_arrays
 from vibsim.formula import Name, Switch, to_formula
-from vibsim.models import Model
+from vibsim.models.base import Model, by_name
 from vibsim.simulation.members import Members
 from vibsim.simulation.reference.one_sided_forces import TABLE, Sides, sides
 
@@ -138,7 +138,7 @@ def corners_of(model: Model, finest: Record, group: Members, dt: Floats) -> Corn
     """
     states = np.stack([np.asarray(finest[state.name], dtype=float) for state in model.states])
     _, schemes, cases, samples = states.shape
-    numbers = {row.name: group.parameters[row.key] for row in model.parameters}
+    numbers = by_name(model.parameters, group.parameters)
     tables = table_corners(model, numbers, group.end, dt)
     none = np.full((schemes, cases), np.nan)
     if not switches_of(model) or samples < 2:

@@ -391,6 +391,11 @@ def parameter_names(model: Model) -> tuple[str, ...]:
     return tuple(parameter.name for parameter in model.parameters)
 
 
+def by_name(parameters: Iterable[Parameter], numbers: Numbers) -> dict[str, Any]:
+    """Return the values of parameters by their names in formulas, from `numbers` by their keys."""
+    return {row.name: numbers[row.key] for row in parameters}
+
+
 def natural_end(model: Model, periods: float, parameters: Numbers) -> Any:
     """Return the duration of a number of natural periods (small oscillations), as a number or an array."""
     return periods * (2.0 * math.pi / model.natural_frequency(parameters))
@@ -412,9 +417,9 @@ def looked_up(
 def table_end(model: Model, parameters: Numbers) -> Any:
     """Return the time at which a motion reaches the last point of the table, at the speed of `Lookup.place`."""
     assert model.lookup is not None
-    numbers = {row.name: parameters[row.key] for row in model.parameters}
+    numbers = {**by_name(model.parameters, parameters), "t": 1.0}
     with np.errstate(divide="ignore"):
-        speed = np.asarray(values(tree(model, model.lookup.place), {**numbers, "t": 1.0}), float)
+        speed = np.asarray(values(tree(model, model.lookup.place), numbers), float)
         return model.lookup.table.last / speed
 
 

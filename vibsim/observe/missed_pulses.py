@@ -11,7 +11,7 @@ from vibsim.apriori.table_corners import has_tables, table_pulses
 from vibsim.core.array_types import Flags, Floats
 from vibsim.core.record import Record, Variable
 from vibsim.formula import Pulses
-from vibsim.models import Model
+from vibsim.models.base import Model, by_name
 from vibsim.observe.thresholds import MOST_GAPS
 from vibsim.simulation.members import Members
 from vibsim.simulation.reference.one_sided_forces import pulses_of_force, varies_in_time
@@ -30,9 +30,7 @@ class Missed:
 
 def missed_pulses(model: Model, finest: Record, group: Members) -> Missed:
     """Return a pulse of the force between the points of the finest level, which include those of all other levels."""
-    parameters = {
-        row.name: np.asarray(group.parameters[row.key], dtype=float) for row in model.parameters
-    }
+    parameters = by_name(model.parameters, group.parameters)
     steps = int(np.asarray(finest.attrs["steps"]).item())
     of_tables = table_pulses(model, parameters, group.end, steps)
     in_tables = np.isfinite(of_tables.time)

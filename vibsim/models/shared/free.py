@@ -13,7 +13,7 @@ import numpy as np
 
 from vibsim.core.array_types import Floats
 from vibsim.formula import ZERO, derivative, put, values
-from vibsim.models.base import Model, Numbers, tree
+from vibsim.models.base import Model, Numbers, by_name, tree
 
 
 @dataclass(frozen=True)
@@ -56,7 +56,7 @@ def free_oscillation(model: Model, initial: Numbers, parameters: Numbers) -> Fre
     initial, parameters
         Numbers or arrays of shape (case,), by the names of the states and by `vibsim.models.base.Parameter.key`.
     """
-    named = {row.name: np.asarray(parameters[row.key], float) for row in model.parameters}
+    named = by_name(model.parameters, parameters)
     force = tree(model, model.acceleration)
     at_rest = put(put(force, model.position, ZERO), model.velocity, ZERO)
     stiffness = -values(derivative(force, model.position), named)

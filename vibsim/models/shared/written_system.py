@@ -38,7 +38,7 @@ from vibsim.formula import (
 )
 from vibsim.formula.algebra import terms_of
 from vibsim.formula.tree import paired
-from vibsim.models.base import Numbers, Parameter, declared_parameters, speeds
+from vibsim.models.base import Numbers, Parameter, by_name, declared_parameters, speeds
 from vibsim.models.events import Crossings
 from vibsim.models.shared.coordinates import velocities_of
 from vibsim.models.shared.crossings import crossings
@@ -278,8 +278,8 @@ class WrittenSystem:
         Gyroscopic coupling of velocities (with opposite signs, as in a magnetic field or a rotating frame) is included;
         damping is not.
         """
-        numbers = {row.name: np.asarray(parameters[row.key], float) for row in self.parameters}
-        shape = np.broadcast_shapes(*(number.shape for number in numbers.values()))
+        numbers = by_name(self.parameters, parameters)
+        shape = np.broadcast_shapes(*map(np.shape, numbers.values()))
         at_origin = dict.fromkeys((*self.states, "t", HEIGHT), np.zeros(()))
         count = len(self.coordinates)
         stiffness, coupling = np.zeros((2, *shape, count, count))
