@@ -20,7 +20,6 @@ from vibsim.core.array_types import Floats
 from vibsim.core.vocabulary import CENTRED, plain_name
 from vibsim.experiment.schema.checks import EqualCheck
 from vibsim.models import ENERGIES
-from vibsim.observe.common_grid import whole
 from vibsim.observe.member_block import MemberBlock, energy_at_start, stored_or_nan
 from vibsim.observe.predicted_oscillation import is_simple, natural_frequency, steppers
 
@@ -90,7 +89,7 @@ def discrete(block: MemberBlock, level: int, name: str, scheme: int) -> Floats:
     if not is_simple(block) or name not in (model.position, model.velocity):
         return series
     steps, numbers = _numbers(block, level)
-    n = np.arange(len(record["t"])) * whole(record, "every")
+    n = np.arange(len(record["t"])) * record.whole("every")
     for options, where in steppers(block, scheme):
         w, dt, u, v = (x[where] for x in numbers)
         stepper = block.experiment.schemes[scheme].method.stepper(options)
@@ -124,7 +123,7 @@ def exact_series(block: MemberBlock, level: int, name: str) -> Floats:
     shape = (*block.shape, len(record["t"]))
     if plain == "energy" and model.conservative:
         return np.broadcast_to(energy_at_start(record)[..., None], shape)
-    n = np.arange(shape[-1]) * whole(record, "every")
+    n = np.arange(shape[-1]) * record.whole("every")
     t = n * (block.group.end / block.grid.steps[block.grid.levels.index(level)])[:, None]
     if model.exact is not None:
         states = block.group.exact(model, t)

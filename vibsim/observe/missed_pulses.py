@@ -31,7 +31,7 @@ class Missed:
 def missed_pulses(model: Model, finest: Record, group: Members) -> Missed:
     """Return a pulse of the force between the points of the finest level, which include those of all other levels."""
     parameters = by_name(model.parameters, group.parameters)
-    steps = int(np.asarray(finest.attrs["steps"]).item())
+    steps = finest.whole("steps")
     of_tables = table_pulses(model, parameters, group.end, steps)
     in_tables = np.isfinite(of_tables.time)
     if not varies_in_time(model):
@@ -62,7 +62,7 @@ def _of_formulas(
         at = states[:, scheme[:, None], np.arange(cases)[:, None], np.clip(place, 0, samples)]
         return pulses_of_force(model, parameters, at, t, smooth=smooth)
 
-    gaps = steps = int(np.asarray(finest.attrs["steps"]).item())
+    gaps = steps = finest.whole("steps")
     while cases * gaps > MOST_GAPS and gaps % 2 == 0:
         gaps //= 2
     t = np.arange(gaps + 1) * (group.end / gaps)[:, None]

@@ -81,7 +81,7 @@ def growth_over_run(block: MemberBlock, record: Record) -> Floats:
 
 def has_recurrence(block: MemberBlock, level: int) -> bool:
     """Tell whether a recurrence can be fitted to the steps of a level: a linear model, with every step stored."""
-    return is_simple(block) and int(np.asarray(block.records[level].attrs["every"])) == 1
+    return is_simple(block) and block.records[level].whole("every") == 1
 
 
 def _recurrence(block: MemberBlock, level: int) -> Recurrence | None:
