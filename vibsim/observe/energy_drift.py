@@ -153,7 +153,7 @@ def drift_of(
     energy: Floats,
     floor: Floats,
     periods: Floats,
-    deviation: Floats | None = None,
+    deviation: Floats,
 ) -> Drift:
     """Return the growth of the energy error.
 
@@ -166,7 +166,7 @@ def drift_of(
     periods
         Length of the run in natural periods, shape (case,).
     deviation
-        The deviation with its sign, in the shape of M; None: only M is used.
+        The deviation with its sign, in the shape of M.
     """
     samples = running.shape[-1] - 1
     end = np.fmax.reduce(running, axis=-1)
@@ -181,26 +181,23 @@ def drift_of(
     size = np.where(np.isfinite(end) & (end > 0), end, 1.0)
     allowed = np.broadcast_to(ABOVE_ROUND_OFF * floor, end.shape)
     still = _is_still(rise, k, size)
+    moves = _shifts_the_range(deviation)
     # a small rise may be the last stair of an oscillation with several frequencies
-    stops = last_rise < th.STILL_WIDENS * rise
-    if deviation is not None:
-        moves = _shifts_the_range(deviation)
-        stops |= ~moves
+    stops = (last_rise < th.STILL_WIDENS * rise) | ~moves
     has_stopped = (rise < th.SMALL_RISE * size) & stops
-    if deviation is not None:
-        # M is constant until a drift exceeds the opposite swing of an oscillation; shortly after, its k is arbitrary
-        so_far = _range(deviation)
-        of_range = _means(so_far)
-        range_rise, range_k = _rise(of_range)
-        overtakes = _is_near(k, 2) & _is_near(range_k, 1)
-        widens = still | overtakes | ~(_is_near(k, 1) | _is_near(k, 2))
-        widens &= samples >= th.LEAST_PER_PERIOD * periods
-        widens &= ~_is_still(range_rise, range_k, size)
-        stops = _last_rise(so_far) < th.STILL_WIDENS * range_rise
-        has_stopped = np.where(widens, stops | ~moves, has_stopped)
-        means = np.where(widens[..., None], of_range, means)
-        rise, k = _rise(means)
-        still &= ~widens
+    # M is constant until a drift exceeds the opposite swing of an oscillation; shortly after, its k is arbitrary
+    so_far = _range(deviation)
+    of_range = _means(so_far)
+    range_rise, range_k = _rise(of_range)
+    overtakes = _is_near(k, 2) & _is_near(range_k, 1)
+    widens = still | overtakes | ~(_is_near(k, 1) | _is_near(k, 2))
+    widens &= samples >= th.LEAST_PER_PERIOD * periods
+    widens &= ~_is_still(range_rise, range_k, size)
+    stops = (_last_rise(so_far) < th.STILL_WIDENS * range_rise) | ~moves
+    has_stopped = np.where(widens, stops, has_stopped)
+    means = np.where(widens[..., None], of_range, means)
+    rise, k = _rise(means)
+    still &= ~widens
     closer = ~(np.abs(k_log - 1.0) >= np.abs(k - 1.0))
     exponential = (np.abs(last) > th.LARGE_CHANGE) & _is_near(k_log, 1) & closer
     short = (periods < th.LEAST_PERIODS) | (samples < th.LEAST_SAMPLES)

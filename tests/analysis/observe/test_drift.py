@@ -27,7 +27,7 @@ def kind_of(deviation: Floats, periods: float = PERIODS, floor: float = 1e-15) -
     running = np.maximum.accumulate(np.abs(deviation))[None, None]
     one = np.ones((1, 1))
     ratio = 1.0 + deviation[None, None]
-    found = drift_of(running, ratio, one, floor * one, np.array([periods]))
+    found = drift_of(running, ratio, one, floor * one, np.array([periods]), deviation[None, None])
     return DRIFTS[int(found.kind[0, 0])], float(found.rate[0, 0])
 
 
@@ -63,6 +63,7 @@ def test_exponential_growth_and_decay_are_named_with_their_rate(change: float) -
         one,
         1e-15 * one,
         np.array([PERIODS]),
+        np.expm1(change * S)[None, None],
     )
     assert DRIFTS[int(found.kind[0, 0])] == "exponential"
     assert found.rate[0, 0] * PERIODS == pytest.approx(change, rel=1e-9)
@@ -91,7 +92,8 @@ def test_what_is_above_underflow_decides(end: float) -> None:
     running = np.where(S > 0, 1.0, 0.0)[None, None]
 
     def found(ratio: Floats) -> tuple[str, float]:
-        drift = drift_of(running, ratio[None, None], one, 1e-15 * one, np.array([PERIODS]))
+        ratio = ratio[None, None]
+        drift = drift_of(running, ratio, one, 1e-15 * one, np.array([PERIODS]), ratio - 1.0)
         return DRIFTS[int(drift.kind[0, 0])], float(drift.rate[0, 0]) * PERIODS
 
     decay = np.where(end >= S, np.exp(-700.0 * S / max(end, 0.01)), 0.0)
@@ -162,7 +164,8 @@ def test_a_range_that_stops_widening_shows_no_drift(stops: float, kind: str) -> 
 def test_an_overflow_of_one_member_is_no_warning() -> None:
     running = np.stack([1e-3 * S, np.where(S > 0.5, np.inf, 1e-3 * S)])[None]
     ones = np.ones((1, 2))
-    found = drift_of(running, 1.0 + running, ones, 1e-15 * ones, np.array([PERIODS, PERIODS]))
+    periods = np.array([PERIODS, PERIODS])
+    found = drift_of(running, 1.0 + running, ones, 1e-15 * ones, periods, running)
     assert [DRIFTS[int(code)] for code in found.kind[0]] == ["linear", "unclear"]
 
 
