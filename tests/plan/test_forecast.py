@@ -12,7 +12,6 @@ from vibsim.cli import main
 from vibsim.core.home import home
 from vibsim.experiment import Experiment, cost
 from vibsim.plan import build, forecast
-from vibsim.simulation import level
 
 CONFIGS = home() / "configs"
 
@@ -60,13 +59,6 @@ def test_every_scheme_takes_time_beside_its_steps(tmp_path: Path) -> None:
         own = Experiment.from_yaml(file)
         seconds.append(build.build(own).other_seconds)
     assert 4 * forecast.SCHEME_SECONDS <= seconds[1] - seconds[0] < 6 * forecast.SCHEME_SECONDS
-
-
-def test_the_limits_of_references_are_those_of_the_simulation() -> None:
-    from vibsim.observe import thresholds
-
-    assert forecast.MOST_REFERENCES == level.MOST_REFERENCES
-    assert forecast.MOST_GAPS == thresholds.MOST_GAPS
 
 
 def test_checking_and_planning_compute_no_reference(

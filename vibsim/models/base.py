@@ -386,6 +386,11 @@ def has_solution(model: Model) -> bool:
     return model.exact is not None or (model.events is None and model.loaded is None)
 
 
+def varies_in_time(model: Model) -> bool:
+    """Tell whether the force of a model depends on time, other than by a table."""
+    return any("t" in tree(model, row).names for row in model.forces)
+
+
 def parameter_names(model: Model) -> tuple[str, ...]:
     """Return the names of the parameters in formulas, in the order of the engine."""
     return tuple(parameter.name for parameter in model.parameters)

@@ -11,10 +11,10 @@ from vibsim.apriori.table_corners import has_tables, table_pulses
 from vibsim.core.array_types import Flags, Floats
 from vibsim.core.record import Record, Variable
 from vibsim.formula import Pulses
-from vibsim.models.base import Model, by_name
-from vibsim.observe.thresholds import MOST_GAPS
+from vibsim.formula.jumps import MOST_GAPS
+from vibsim.models.base import Model, by_name, varies_in_time
 from vibsim.simulation.members import Members
-from vibsim.simulation.reference.one_sided_forces import pulses_of_force, varies_in_time
+from vibsim.simulation.reference.one_sided_forces import pulses_of_force
 
 AROUND = np.arange(-2, 4)  # points around a pulse
 
