@@ -172,31 +172,27 @@ def drift_of(
     end = np.fmax.reduce(running, axis=-1)
     with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
         change = on_arrays.log(np.abs(ratio))
-        means = _means(running)
-        rise, k = _rise(means)
         fall, k_log = _power(np.abs(change))
         last, left = change[..., -1], np.abs(ratio * energy[..., None])[..., -1]
-        gone = (left < th.SMALLEST_NORMAL) & (np.abs(energy) > th.SMALLEST_NORMAL)
-        last_rise = _last_rise(running)
+        means, so_far = _means(running), _range(deviation)
+        of_range = _means(so_far)
+        (rise, k), (range_rise, range_k) = _rise(means), _rise(of_range)
+        # the last rise of an oscillation with several frequencies may be a stair
+        moves = _shifts_the_range(deviation)
+        stops = (_last_rise(running) < th.STILL_WIDENS * rise) | ~moves
+        range_stops = (_last_rise(so_far) < th.STILL_WIDENS * range_rise) | ~moves
+    gone = (left < th.SMALLEST_NORMAL) & (np.abs(energy) > th.SMALLEST_NORMAL)
     size = np.where(np.isfinite(end) & (end > 0), end, 1.0)
     allowed = np.broadcast_to(ABOVE_ROUND_OFF * floor, end.shape)
     still = _is_still(rise, k, size)
-    moves = _shifts_the_range(deviation)
-    # a small rise may be the last stair of an oscillation with several frequencies
-    stops = (last_rise < th.STILL_WIDENS * rise) | ~moves
-    has_stopped = (rise < th.SMALL_RISE * size) & stops
     # M is constant until a drift exceeds the opposite swing of an oscillation; shortly after, its k is arbitrary
-    so_far = _range(deviation)
-    of_range = _means(so_far)
-    range_rise, range_k = _rise(of_range)
     overtakes = _is_near(k, 2) & _is_near(range_k, 1)
     widens = still | overtakes | ~(_is_near(k, 1) | _is_near(k, 2))
     widens &= samples >= th.LEAST_PER_PERIOD * periods
     widens &= ~_is_still(range_rise, range_k, size)
-    stops = (_last_rise(so_far) < th.STILL_WIDENS * range_rise) | ~moves
-    has_stopped = np.where(widens, stops, has_stopped)
+    has_stopped = np.where(widens, range_stops, (rise < th.SMALL_RISE * size) & stops)
     means = np.where(widens[..., None], of_range, means)
-    rise, k = _rise(means)
+    rise, k = np.where(widens, range_rise, rise), np.where(widens, range_k, k)
     still &= ~widens
     closer = ~(np.abs(k_log - 1.0) >= np.abs(k - 1.0))
     exponential = (np.abs(last) > th.LARGE_CHANGE) & _is_near(k_log, 1) & closer
