@@ -76,7 +76,8 @@ def rounding(block: MemberBlock, level: int, name: str, scheme: int, floor: Floa
         # the centred difference divides the rounding errors of two positions by 2 dt
         bounds_of_state = bounds[int(plain == block.model.velocity)]
         result[where] = bounds[0] / dt if name.endswith(CENTRED) else bounds_of_state
-    return result
+    # the theory is that of an oscillation
+    return np.where(np.isnan(natural_frequency(block)), floor, result)
 
 
 def discrete(block: MemberBlock, level: int, name: str, scheme: int) -> Floats:
@@ -141,6 +142,5 @@ def _accuracy_of_exact(block: MemberBlock, level: int, name: str, values: Floats
     record, bound = block.records[level], f"{plain_name(name)}_exact_error"
     if bound in record:
         return np.asarray(record[bound], dtype=float)
-    phase = natural_frequency(block) * block.group.end
     size = np.max(np.abs(np.nan_to_num(values)), axis=-1)
-    return np.asarray(SPACING_AT_ONE * (1.0 + phase) * size * block.magnified)
+    return np.asarray(SPACING_AT_ONE * (1.0 + block.phase) * size * block.magnified)

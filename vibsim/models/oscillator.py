@@ -196,6 +196,8 @@ def _friction(user: Written, forces: Forces) -> dict[str, Any]:
     def held(t: Floats, initial: Numbers, parameters: Numbers) -> dict[str, Floats]:
         numbers = by_name(user.parameters, parameters)
         stiffness = values(forces.stiffness, numbers)
+        # the motion is not known where the spring does not pull back
+        stiffness = np.where(stiffness > 0.0, stiffness, np.nan)
         w = np.sqrt(stiffness / numbers["m"])
         u, v = friction_motion(t, w, numbers["b"] / stiffness, initial["u"], initial["v"])
         return {"u": u, "v": v}

@@ -98,8 +98,13 @@ def drift_at(block: MemberBlock, level: int, name: str = "energy_deviation") -> 
         floor = np.maximum(floor, _of_steps(block, level) * size * condition)
     # for an adaptive scheme the floor contains its tolerance, which is not round-off
     floor[block.adaptive] = SPACING_AT_ONE * size[block.adaptive]
-    w = np.asarray(record["natural_frequency"], dtype=float)
-    return drift_of(running, ratio, initial, floor, w * block.group.end / (2.0 * np.pi), deviation)
+    w, exact = (
+        stored_or_nan(record, name, block.shape[1:])
+        for name in ("natural_frequency", "exact_period")
+    )
+    end = block.group.end
+    periods = np.where(np.isnan(w), end / exact, w * end / (2.0 * np.pi))
+    return drift_of(running, ratio, initial, floor, periods, deviation)
 
 
 def _held(series: Floats, members: Flags) -> Floats:
@@ -142,7 +147,7 @@ def _of_steps(block: MemberBlock, level: int) -> Floats:
     kinds = [scheme.method for scheme in block.experiment.schemes]
     plain = np.array([kind.round_off is round_off for kind in kinds])
     index = block.grid.levels.index(level)
-    p, steps = block.omega_dt[:, index], block.grid.steps[index]
+    p, steps = block.radians[:, index], block.grid.steps[index]
     size = th.STEPPED * UNIT_ROUND_OFF * (steps * p + steps**0.5 * p * p)
     return np.where(plain[:, None], np.minimum(size, th.MOST_ROUNDED), 0.0) / ABOVE_ROUND_OFF
 

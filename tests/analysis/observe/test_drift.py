@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from spring_runs import registered, spring
 
+from vibsim import Experiment, analyse, simulate, verdicts
 from vibsim.core.vocabulary import DRIFTS
 from vibsim.observe.energy_drift import drift_of
 from vibsim.observe.thresholds import STILL
@@ -259,3 +260,34 @@ def test_the_last_time_counts_where_its_velocity_is_that_of_all_others() -> None
     assert found[2] == pytest.approx(np.max(energies[2, :-1]) / initial[2], rel=1e-12)
     assert found[3] == pytest.approx(np.max(energies[3]) / initial[3], rel=1e-12)
     assert found[2] < found[3]
+
+
+@pytest.mark.parametrize(
+    ("model", "initial", "verdicts_of"),
+    [
+        # a body without a spring, exact at every step; a cubic spring alone; a spring that pushes away
+        ({"kind": "oscillator", "spring": "0"}, {"u": 1.0, "v": 0.3}, ("PASS", "PASS")),
+        ({"kind": "duffing", "alpha": 0.0}, {"u": 1.0}, ("FAIL", "FAIL")),
+        ({"kind": "oscillator", "spring": "-0.1*u"}, {"u": 0.2, "v": 0.3}, ("FAIL", "PASS")),
+    ],
+)
+def test_round_off_is_known_without_small_oscillations(
+    model: dict[str, object], initial: dict[str, float], verdicts_of: tuple[str, str]
+) -> None:
+    """Their frequency is not defined; an error of 0 once failed as no round-off."""
+    made = Experiment.from_dict(
+        {
+            "title": "t",
+            "model": model,
+            "initial": initial,
+            "time": {"end": 10.0, "base_steps": 8},
+            "levels": [3, 4, 5, 6],
+            "schemes": ["rk4"],
+            "checks": [
+                {"equal": ["rk4", "exact"], "quantity": "u"},
+                {"conserves": "energy", "drift": "none"},
+            ],
+        }
+    )
+    found = verdicts(made, analyse(made, [simulate(made, level) for level in made.levels]))
+    assert tuple(row.status for row in found) == verdicts_of
