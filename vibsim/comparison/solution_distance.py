@@ -21,7 +21,12 @@ from vibsim.core.vocabulary import CENTRED, plain_name
 from vibsim.experiment.schema.checks import EqualCheck
 from vibsim.models import ENERGIES
 from vibsim.observe.member_block import MemberBlock, energy_at_start, stored_or_nan
-from vibsim.observe.predicted_oscillation import is_simple, natural_frequency, steppers
+from vibsim.observe.predicted_oscillation import (
+    equilibrium,
+    is_simple,
+    natural_frequency,
+    steppers,
+)
 
 
 @dataclass(frozen=True)
@@ -71,8 +76,11 @@ def rounding(block: MemberBlock, level: int, name: str, scheme: int, floor: Floa
     steps, numbers = _numbers(block, level)
     for options, where in steppers(block, scheme):
         stepper = block.experiment.schemes[scheme].method.stepper(options)
-        w, dt, u, v = (x[where] for x in numbers)
-        bounds = theory.rounding_bound(stepper, w, dt, u, v, steps)
+        w, dt, u, v, rest = (x[where] for x in numbers)
+        of_swing = theory.rounding_bound(stepper, w, dt, u, v, steps)
+        # numbers are rounded at their distance from 0, not from the place of rest
+        of_rest = theory.rounding_bound(stepper, w, dt, rest, 0.0 * v, steps)
+        bounds = [x + np.where(rest == 0.0, 0.0, y) for x, y in zip(of_swing, of_rest, strict=True)]
         # the centred difference divides the rounding errors of two positions by 2 dt
         bounds_of_state = bounds[int(plain == block.model.velocity)]
         result[where] = bounds[0] / dt if name.endswith(CENTRED) else bounds_of_state
@@ -92,10 +100,10 @@ def discrete(block: MemberBlock, level: int, name: str, scheme: int) -> Floats:
     steps, numbers = _numbers(block, level)
     n = np.arange(len(record["t"])) * record.whole("every")
     for options, where in steppers(block, scheme):
-        w, dt, u, v = (x[where] for x in numbers)
+        w, dt, u, v, rest = (x[where] for x in numbers)
         stepper = block.experiment.schemes[scheme].method.stepper(options)
-        states = theory.discrete(stepper, w, dt, u, v, n, steps=steps)
-        series[where] = states[int(name == model.velocity)]
+        swing, velocity = theory.discrete(stepper, w, dt, u, v, n, steps=steps)
+        series[where] = velocity if name == model.velocity else swing + rest[:, None]
     return series
 
 
@@ -110,11 +118,14 @@ def discrete_error(block: MemberBlock, level: int, name: str) -> Floats:
 
 
 def _numbers(block: MemberBlock, level: int) -> tuple[int, tuple[Floats, ...]]:
-    """Return the number of steps, and w, dt and the initial position and velocity, each of shape (case,)."""
+    """Return the number of steps, and w, dt, the start and the place of rest r, each of shape (case,).
+
+    The start is the initial position from r, and the initial velocity.
+    """
     model, initial = block.model, block.group.initial
-    steps = block.grid.steps[block.grid.levels.index(level)]
-    start = initial[model.position], initial[model.velocity]
-    numbers = natural_frequency(block), block.group.end / steps, *start
+    steps, rest = block.grid.steps[block.grid.levels.index(level)], equilibrium(block)
+    start = initial[model.position] - rest, initial[model.velocity]
+    numbers = natural_frequency(block), block.group.end / steps, *start, rest
     return steps, tuple(np.broadcast_to(x, block.shape[1:]) for x in numbers)
 
 

@@ -15,6 +15,7 @@ from vibsim import theory
 from vibsim.apriori.stability_limits import limit_of
 from vibsim.core.array_types import Floats, Integers
 from vibsim.experiment import sweep_columns
+from vibsim.models.shared.free import free_oscillation
 from vibsim.observe.member_block import MemberBlock
 from vibsim.schemes import Options, Scheme
 
@@ -91,6 +92,12 @@ def _step(block: MemberBlock, level: int) -> Floats:
 def natural_frequency(block: MemberBlock) -> Floats:
     """Return w, shape (case,)."""
     return np.asarray(block.finest["natural_frequency"], dtype=np.float64)
+
+
+def equilibrium(block: MemberBlock) -> Floats:
+    """Return the place of rest of a model to which the theory applies, 0 if it has none, shape (case,)."""
+    motion = free_oscillation(block.model, block.group.initial, block.group.parameters)
+    return np.broadcast_to(np.nan_to_num(motion.equilibrium), block.shape[1:])
 
 
 def limits(block: MemberBlock) -> Floats:

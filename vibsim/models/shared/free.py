@@ -28,6 +28,8 @@ class FreeOscillation:
     """Initial position relative to the equilibrium r."""
     velocity: Floats
     """Initial velocity over w."""
+    equilibrium: Floats
+    """The place of rest r."""
 
 
 @cache
@@ -64,5 +66,6 @@ def free_oscillation(model: Model, initial: Numbers, parameters: Numbers) -> Fre
     with np.errstate(all="ignore"):
         w = np.sqrt(np.where(stiffness > 0.0, stiffness, np.nan))
         equilibrium = values(at_rest, named) / stiffness
-    numbers = w, rate / w, initial[model.position] - equilibrium, initial[model.velocity] / w
+    start = initial[model.position] - equilibrium, initial[model.velocity] / w
+    numbers = w, rate / w, *start, equilibrium
     return FreeOscillation(*np.broadcast_arrays(*(np.atleast_1d(x) for x in numbers)))
