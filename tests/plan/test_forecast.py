@@ -97,3 +97,19 @@ def test_the_times_of_a_plan_hang_together(capsys: Any) -> None:
     told = capsys.readouterr().out
     assert "reference: about" in told
     assert "of CPU time" in told
+
+
+def test_loads_of_a_structure_are_searched_for_pulses_like_other_forces() -> None:
+    def gaps(load: str) -> int:
+        made = Experiment.from_dict(
+            {
+                "title": "t",
+                "model": {"kind": "structure", "stiffness": [1, 2], "load": {"2": load}},
+                "time": {"end": 10.0, "base_steps": 50},
+                "levels": [0, 1],
+                "schemes": ["newmark"],
+            }
+        )
+        return forecast.gaps(made, [cost.level_cost(made, level) for level in made.levels])
+
+    assert (gaps("1"), gaps("cos(t)")) == (0, 100)

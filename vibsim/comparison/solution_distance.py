@@ -19,14 +19,10 @@ from vibsim.convergence.thresholds import ABOVE_ROUND_OFF
 from vibsim.core.array_types import Floats
 from vibsim.core.vocabulary import CENTRED, plain_name
 from vibsim.experiment.schema.checks import EqualCheck
+from vibsim.experiment.sweep_columns import option_groups
 from vibsim.models import ENERGIES
 from vibsim.observe.member_block import MemberBlock, energy_at_start, stored_or_nan
-from vibsim.observe.predicted_oscillation import (
-    equilibrium,
-    is_simple,
-    natural_frequency,
-    steppers,
-)
+from vibsim.observe.predicted_oscillation import equilibrium, is_simple, natural_frequency
 
 
 @dataclass(frozen=True)
@@ -74,7 +70,7 @@ def rounding(block: MemberBlock, level: int, name: str, scheme: int, floor: Floa
         return np.broadcast_to(floor, block.shape[1:])
     result = np.full(block.shape[1:], np.nan)
     steps, numbers = _numbers(block, level)
-    for options, where in steppers(block, scheme):
+    for options, where in option_groups(block.experiment, scheme, block.columns):
         stepper = block.experiment.schemes[scheme].method.stepper(options)
         w, dt, u, v, rest = (x[where] for x in numbers)
         of_swing = theory.rounding_bound(stepper, w, dt, u, v, steps)
@@ -95,11 +91,12 @@ def discrete(block: MemberBlock, level: int, name: str, scheme: int) -> Floats:
     """
     record, model = block.records[level], block.model
     series = np.full((*block.shape[1:], len(record["t"])), np.nan)
-    if not is_simple(block) or name not in (model.position, model.velocity):
+    is_known = is_simple(block) and not block.adaptive[scheme]
+    if not is_known or name not in (model.position, model.velocity):
         return series
     steps, numbers = _numbers(block, level)
     n = np.arange(len(record["t"])) * record.whole("every")
-    for options, where in steppers(block, scheme):
+    for options, where in option_groups(block.experiment, scheme, block.columns):
         w, dt, u, v, rest = (x[where] for x in numbers)
         stepper = block.experiment.schemes[scheme].method.stepper(options)
         swing, velocity = theory.discrete(stepper, w, dt, u, v, n, steps=steps)

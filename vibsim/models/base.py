@@ -163,7 +163,9 @@ class Model:
     potential_energy: Formula
     energy_unit: str
     linear: bool
+    """Whether there is one coordinate, whose force is linear in it with a constant coefficient."""
     conservative: bool
+    """Whether the energy is constant."""
     natural_frequency: Callable[[Numbers], Any]
     """Angular frequency of small oscillations [rad per unit of time], from the parameters; the lowest if several."""
     turn: float | None = None

@@ -132,8 +132,6 @@ class MemberBlock:
             exact = self.exact[plain][None]
         elif self.model.conservative and plain == "energy":
             exact = energy_at_start(self.finest)[..., None]
-        elif self.model.conservative and plain == "energy_deviation":
-            return np.zeros((1, 1, 1))
         else:
             t = self.grid.times(self.group.end)
             known = known_values(self.model, plain, self.exact, t, self.group)
