@@ -81,13 +81,14 @@ class MemberBlock:
     def phase(self) -> Floats:
         """Duration of the run in radians, ``w T``, shape (c,).
 
-        Without small oscillations it is that of the exact period; 1 if there is none.
+        Without small oscillations it is that of the exact period; for a smooth motion without a period 1, else NaN.
         """
         w, period = (
             stored_or_nan(self.finest, name, self.shape[1:])
             for name in ("natural_frequency", "exact_period")
         )
-        own = np.fmax(2.0 * np.pi / period * self.group.end, 1.0)
+        least = 1.0 if self.model.events is None else np.nan
+        own = np.fmax(2.0 * np.pi / period * self.group.end, least)
         return np.where(np.isnan(w), own, w * self.group.end)
 
     @property
