@@ -62,7 +62,7 @@ def test_steps_from_point_to_point_keep_their_order_at_every_speed(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     # the other solver is what they are compared with
-    monkeypatch.setattr("vibsim.simulation.level.MOST_REFERENCES", 0)
+    monkeypatch.setattr("vibsim.experiment.storage.MOST_REFERENCES", 0)
     given = yaml.safe_load((FOLDER / "bumpy_road.yaml").read_text())
     speeds = [3.7, 13.3]
     content = {

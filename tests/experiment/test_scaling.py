@@ -95,7 +95,7 @@ def test_dimensionless_numbers_and_what_leads_back():
 )
 def test_the_scaled_run_leads_back_to_the_plain_one(monkeypatch, model, initial):
     # a reference solution is none of what is compared
-    monkeypatch.setattr("vibsim.simulation.level.MOST_REFERENCES", 0)
+    monkeypatch.setattr("vibsim.experiment.storage.MOST_REFERENCES", 0)
     plain, scaled = pair(model=model, initial=initial, schemes=["rk4"])
     records = [simulate_record(experiment, 6) for experiment in (plain, scaled)]
     outputs = [row.name for row in plain.model.definition.outputs]

@@ -200,3 +200,11 @@ def test_the_energy_of_the_yielding_spring_does_not_cancel(x):
     found = float(values(pull, {"u": u, "v": 0, "t": 0, "k": k, "alpha": alpha, "m": 1}))
     own = -k * u if x < 1e-100 else -k / alpha * math.tanh(alpha * u)
     assert found == pytest.approx(own, rel=8 * 2.0**-53)
+
+
+@pytest.mark.parametrize("spring", ["0", "-0.1*u", "k*u"])
+def test_friction_has_no_exact_motion_where_the_spring_does_not_pull_back(spring: str) -> None:
+    model = written({"spring": spring, "damping": "b*sign(v)"}, ("k",) if "k" in spring else ())
+    parameters = {"m": 1.0, "damping.coulomb": 0.05, "parameters.k": np.array([[0.0], [-1.0]])}
+    states = model.exact(np.linspace(0.0, 5.0, 9), {"u": 0.2, "v": 0.3}, parameters)
+    assert all(np.isnan(values).all() for values in states.values())

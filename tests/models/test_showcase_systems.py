@@ -21,7 +21,7 @@ FRACTION = np.linspace(0.0, 1.0, 201)
 @pytest.fixture
 def without_references(monkeypatch):
     """Simulate without the exact solutions, which take seconds: others are what is compared here."""
-    monkeypatch.setattr("vibsim.simulation.level.MOST_REFERENCES", 0)
+    monkeypatch.setattr("vibsim.experiment.storage.MOST_REFERENCES", 0)
 
 
 ENDS = {"quarter_car": 2.0, "wave_string": 1.0}

@@ -123,6 +123,20 @@ def test_a_chain_moves_as_its_modes_do(count):
             "mu*(x - y)**4/4 + x**2/2 + ((mu - 2*y)**3 - mu**3)/6",
             True,
         ),
+        # what acts late, for a short time, far away or fast only
+        (("u",), {"acceleration.u": "-u + where(t > 5, 1, 0)"}, "u**2/2", False),
+        (("u",), {"acceleration.u": "-u + heaviside(t - 700) - heaviside(t - 700.001)"}, "u**2/2", False),
+        (("u",), {"acceleration.u": "-u - v*max(abs(u) - 2, 0)"}, "u**2/2", False),
+        (("u",), {"acceleration.u": "-u - mu*v*(u > 20 and u < 21)"}, "u**2/2", False),
+        (("u",), {"acceleration.u": "-u - mu*sign(v)*max(abs(v) - 2, 0)"}, "u**2/2", False),
+        (("x", "y"), {"acceleration.x": "-x - y*max(x - 2, 0)", "acceleration.y": "-y"}, "0", False),
+        (("u",), {"acceleration.u": "-u - 3*max(u - 2, 0)"}, "u**2/2 + 3*max(u - 2, 0)**2/2", True),
+        (
+            ("x", "y"),
+            {"acceleration.x": "vy*(t > 5)", "acceleration.y": "-vx*(t > 5)"},
+            "0",
+            True,
+        ),
     ],
 )  # fmt: skip
 def test_the_energy_is_found_where_there_is_one(names, formulas, potential, is_conservative):

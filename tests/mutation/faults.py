@@ -376,7 +376,7 @@ FAULTS = (
         "stride of the next level",
         "analysis",
         "observe/common_grid.py",
-        'return grid.strides[grid.levels.index(whole(record, "level"))]',
+        'return grid.strides[grid.levels.index(record.whole("level"))]',
         "return grid.strides[0]",
     ),
     Fault(

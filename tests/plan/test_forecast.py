@@ -12,7 +12,6 @@ from vibsim.cli import main
 from vibsim.core.home import home
 from vibsim.experiment import Experiment, cost
 from vibsim.plan import build, forecast
-from vibsim.simulation import level
 
 CONFIGS = home() / "configs"
 
@@ -62,13 +61,6 @@ def test_every_scheme_takes_time_beside_its_steps(tmp_path: Path) -> None:
     assert 4 * forecast.SCHEME_SECONDS <= seconds[1] - seconds[0] < 6 * forecast.SCHEME_SECONDS
 
 
-def test_the_limits_of_references_are_those_of_the_simulation() -> None:
-    from vibsim.observe import thresholds
-
-    assert forecast.MOST_REFERENCES == level.MOST_REFERENCES
-    assert forecast.MOST_GAPS == thresholds.MOST_GAPS
-
-
 def test_checking_and_planning_compute_no_reference(
     monkeypatch: pytest.MonkeyPatch, capsys: Any
 ) -> None:
@@ -105,3 +97,19 @@ def test_the_times_of_a_plan_hang_together(capsys: Any) -> None:
     told = capsys.readouterr().out
     assert "reference: about" in told
     assert "of CPU time" in told
+
+
+def test_loads_of_a_structure_are_searched_for_pulses_like_other_forces() -> None:
+    def gaps(load: str) -> int:
+        made = Experiment.from_dict(
+            {
+                "title": "t",
+                "model": {"kind": "structure", "stiffness": [1, 2], "load": {"2": load}},
+                "time": {"end": 10.0, "base_steps": 50},
+                "levels": [0, 1],
+                "schemes": ["newmark"],
+            }
+        )
+        return forecast.gaps(made, [cost.level_cost(made, level) for level in made.levels])
+
+    assert (gaps("1"), gaps("cos(t)")) == (0, 100)

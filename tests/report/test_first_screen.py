@@ -208,7 +208,7 @@ def test_the_error_over_the_step_is_in_the_norm_of_the_check(norm):
 
 def test_a_caption_names_the_exact_solution_only_where_it_is_drawn(monkeypatch):
     for references, drag in ((1, 0.0), (0, 0.1)):
-        monkeypatch.setattr("vibsim.simulation.level.MOST_REFERENCES", references)
+        monkeypatch.setattr("vibsim.experiment.storage.MOST_REFERENCES", references)
         exp = samples.experiment(model={"kind": "pendulum", "drag": drag}, levels=[6])
         record, _, decisive = found(exp)
         with style.applied():

@@ -88,7 +88,7 @@ def test_levels_of_the_same_order_before_those_that_are_used_are_not_called_too_
 
 
 def test_levels_that_overflow_broke_down(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("vibsim.simulation.level.MOST_REFERENCES", 0)
+    monkeypatch.setattr("vibsim.experiment.storage.MOST_REFERENCES", 0)
     model = {"kind": "oscillator", "spring": "u**3"}
     labelled = {"kind": "forward_euler", "label": "central"}
     _, record = made(

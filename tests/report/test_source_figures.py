@@ -339,3 +339,15 @@ def test_a_poincare_section_has_a_point_a_period() -> None:
             "the beginnings of the last ten periods, without the end of the run"
         )
         assert np.ptp(u[-3:]) < 0.1 * np.max(np.abs(u))
+
+
+@pytest.mark.parametrize("every", [32, 20])
+def test_a_poincare_section_is_left_out_without_samples_of_every_period(every: int) -> None:
+    """Of 10 or 16 samples in 20 periods it had no step, or one that is no period."""
+    exp = samples.experiment(
+        model={"kind": "duffing", "delta": 0.3, "gamma": 0.2, "omega": 1.2}, initial={"u": 1.0},
+        time={"periods": 20, "steps_per_period": 16, "frequency": "model.omega"}, levels=[0, 1], schemes=["rk4"],
+        samples={"every": every}, checks=[], figures=[{"source": "a", "shows": "poincare"}],
+    )  # fmt: skip
+    ((_, pictures),), _ = drawn(exp)
+    assert not pictures

@@ -311,7 +311,7 @@ def bare(monkeypatch):
 @pytest.mark.slow
 def test_without_an_exact_solution_maps_show_the_estimate_and_its_error_bar(monkeypatch):
     bare(monkeypatch)
-    monkeypatch.setattr("vibsim.simulation.level.MOST_REFERENCES", 0)
+    monkeypatch.setattr("vibsim.experiment.storage.MOST_REFERENCES", 0)
     exp = samples.experiment(sweep=ACROSS, levels=[8, 9, 10, 11], time={"end": 30.0})
     record = samples.record(exp)
     views, _ = samples.views(exp, record, "theta")

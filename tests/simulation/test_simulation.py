@@ -141,7 +141,7 @@ def test_a_member_that_overflows_is_reported_and_the_others_stand():
 def test_work_without_bound_is_reported_in_silence(monkeypatch):
     """The power of drag overflows while the state does not yet; a warning is an error here."""
     # a reference solution would take two seconds, and the work is that of the scheme
-    monkeypatch.setattr("vibsim.simulation.level.MOST_REFERENCES", 0)
+    monkeypatch.setattr("vibsim.experiment.storage.MOST_REFERENCES", 0)
     unstable = experiment(
         model={"kind": "oscillator", "damping": {"quadratic": 100.0}, "force": "cos(t)"},
         initial={"u": 1.0, "v": 1.0},

@@ -77,7 +77,7 @@ def analyse(
     """
     rows = datasets.values() if isinstance(datasets, Mapping) else datasets
     records = [Record.from_xarray(dataset) for dataset in rows]
-    levels = [int(np.asarray(record.attrs["level"]).item()) for record in records]
+    levels = [record.whole("level") for record in records]
     twice = sorted({level for level in levels if levels.count(level) > 1})
     if twice:
         raise VibsimError(f"level {twice[0]} is given more than once")

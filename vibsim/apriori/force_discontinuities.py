@@ -26,7 +26,7 @@ from vibsim.core.record import Record, Variable
 from vibsim.core.vocabulary import MEMBER
 from vibsim.elementary import on_arrays
 from vibsim.formula import Name, Switch, to_formula
-from vibsim.models import Model
+from vibsim.models.base import Model, by_name
 from vibsim.simulation.members import Members
 from vibsim.simulation.reference.one_sided_forces import TABLE, Sides, sides
 
@@ -138,14 +138,14 @@ def corners_of(model: Model, finest: Record, group: Members, dt: Floats) -> Corn
     """
     states = np.stack([np.asarray(finest[state.name], dtype=float) for state in model.states])
     _, schemes, cases, samples = states.shape
-    numbers = {row.name: group.parameters[row.key] for row in model.parameters}
+    numbers = by_name(model.parameters, group.parameters)
     tables = table_corners(model, numbers, group.end, dt)
     none = np.full((schemes, cases), np.nan)
     if not switches_of(model) or samples < 2:
         nowhere = np.zeros(none.shape, dtype=bool)
         return Corners(none, none, np.full(none.shape, -1), none, none, nowhere, *tables)
-    number = np.arange(samples) * int(np.asarray(finest.attrs["every"]).item())
-    t = number * (group.end / int(np.asarray(finest.attrs["steps"]).item()))[:, None]
+    dt_finest = group.end / finest.whole("steps")
+    t = np.arange(samples) * finest.whole("every") * dt_finest[:, None]
     law = sides(model, {name: np.repeat(x, samples) for name, x in numbers.items()})
     with np.errstate(all="ignore"):
         changed = _has_event(finest, t, schemes)
@@ -154,7 +154,7 @@ def corners_of(model: Model, finest: Record, group: Members, dt: Floats) -> Corn
         np.stack(column) for column in zip(*rows, strict=True)
     )
     distance = np.abs(time - np.round(time / dt) * dt)
-    near = distance < group.end / int(np.asarray(finest.attrs["steps"]).item())
+    near = distance < dt_finest
     return Corners(power, time, switch, least, least_time, near, *tables)
 
 

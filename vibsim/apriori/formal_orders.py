@@ -18,8 +18,7 @@ from vibsim.core.vocabulary import PHASE, is_error_part, whole_of
 from vibsim.experiment import Experiment
 from vibsim.experiment.sweep_columns import Columns, by_options, option_groups, recorded_columns
 from vibsim.formula import values
-from vibsim.models import tree
-from vibsim.models.base import components
+from vibsim.models.base import by_name, components, tree
 from vibsim.models.shared.free import free_oscillation, why_not_free
 from vibsim.schemes import FIXED_STEP, Options, Scheme
 from vibsim.schemes.base import ORDER_AT_CORNERS, is_on_the_mesh
@@ -78,8 +77,7 @@ def beginnings(experiment: Experiment, columns: Columns) -> Integers:
     with np.errstate(all="ignore"):
         frequency = np.asarray(model.natural_frequency(parameters), dtype=float)
         rounding = BALANCED * fastest * np.nan_to_num(frequency)
-        numbers = {row.name: np.asarray(parameters[row.key], float) for row in model.parameters}
-        numbers |= {**initial, "t": np.zeros(1)}
+        numbers = {**by_name(model.parameters, parameters), **initial, "t": np.zeros(1)}
         accelerations = [np.abs(values(tree(model, a), numbers)) for a in model.accelerations]
         is_balanced = np.max(accelerations, axis=0) <= rounding
     index = np.where(at_rest, BEGINNINGS.index("rest"), BEGINNINGS.index("any"))

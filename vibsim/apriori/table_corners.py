@@ -22,7 +22,7 @@ STRAIGHT = 1e-9
 PULSE_RATIO = 2.0
 """A pulse exceeds the values at the grid points around it by more than this multiple of their range, ..."""
 SMALLEST_PULSE = 1e-3
-"""... and by more than this fraction of the largest force. [convention]"""
+"""... and by more than this fraction of the largest force until the end. [convention]"""
 
 
 def is_on_a_point(t: Floats, dt: Floats) -> Flags:
@@ -44,7 +44,8 @@ def table_corners(
     """Return the corners of tables inside steps of length dt, shape (3, case); NaN without a corner.
 
     Rows: time of the first one [s], sum of all changes of slope over the largest change, and the same sum over the
-    largest force [1/s]. `parameters` are those of the members by name, each of shape (case,), as are `end` and `dt`.
+    largest force until the end [1/s]. `parameters` are those of the members by name, each of shape (case,), as are
+    `end` and `dt`.
     """
     corners = np.full((3, len(end)), np.nan)
     if has_tables(model):
@@ -59,12 +60,12 @@ def _member_corners(
 ) -> tuple[float, float, float]:
     """Return a column of `table_corners`, for one member."""
     first, total, sharpest, largest = np.inf, 0.0, 0.0, 0.0
-    for t, force in _histories(model, parameters):
+    for t, force, size in _histories(model, parameters, end):
         slopes = np.diff(force) / np.diff(t)
         turns, at = np.abs(np.diff(slopes)), t[1:-1]
         is_corner = (at > 0.0) & (at < end) & ~is_on_a_point(at, np.asarray(dt))
         is_corner &= turns > STRAIGHT * np.max(np.abs(slopes))
-        largest = max(largest, float(np.max(np.abs(force))))
+        largest = max(largest, size)
         if is_corner.any():
             first = min(first, float(at[is_corner][0]))
             total += float(np.sum(turns[is_corner]))
@@ -78,12 +79,12 @@ def table_pulses(model: Model, parameters: Mapping[str, Floats], end: Floats, st
     for case in range(len(end) if has_tables(model) else 0):
         single, highest = {name: x[case] for name, x in parameters.items()}, 0.0
         grid = np.arange(steps + 1) * (end[case] / steps)
-        for t, force in _histories(model, single):
+        for t, force, size in _histories(model, single, float(end[case])):
             sampled, before = np.interp(grid, t, force), np.searchsorted(grid, t[1:-1]) - 1
             around = sampled[np.clip(before + np.arange(-1, 3)[:, None], 0, steps)]
             low, high = np.min(around, axis=0), np.max(around, axis=0)
             excess = np.maximum(force[1:-1] - high, low - force[1:-1])
-            least = np.maximum(PULSE_RATIO * (high - low), SMALLEST_PULSE * np.max(np.abs(force)))
+            least = np.maximum(PULSE_RATIO * (high - low), SMALLEST_PULSE * size)
             is_pulse = (before >= 0) & (before < steps) & (excess > least)
             i = int(np.argmax(np.where(is_pulse, excess, 0.0)))
             if is_pulse[i] and excess[i] > highest:
@@ -92,19 +93,24 @@ def table_pulses(model: Model, parameters: Mapping[str, Floats], end: Floats, st
     return Pulses(time, width)
 
 
-def _histories(model: Model, parameters: Mapping[str, float]) -> Iterator[tuple[Floats, Floats]]:
-    """Yield the times of the points of every table, and the force there up to a common factor."""
+def _histories(
+    model: Model, parameters: Mapping[str, float], end: float
+) -> Iterator[tuple[Floats, Floats, float]]:
+    """Yield the times of the points of every table, the force there up to a common factor, and its size until `end`."""
+    tables: list[tuple[Floats, Floats]] = []
     if model.loaded is not None:
         structure = model.loaded.structure
-        for number, (t, force) in structure.histories:
-            # a single straight line has no corner
-            if len(t) > 2:
-                yield t, force * np.max(np.abs(structure.shapes[number]))
+        # a single straight line has no corner
+        tables += [
+            (t, force * np.max(np.abs(structure.shapes[number])))
+            for number, (t, force) in structure.histories
+            if len(t) > 2
+        ]
     elif model.lookup is not None:
         table = model.lookup.table
         speed = float(values(tree(model, model.lookup.place), {**parameters, "t": 1.0}))
         if speed > 0.0:
-            yield (
-                (table.first + table.spacing * np.arange(table.points, dtype=np.float64)) / speed,
-                table.bends,
-            )
+            place = table.first + table.spacing * np.arange(table.points, dtype=np.float64)
+            tables.append((place / speed, table.bends))
+    for t, force in tables:
+        yield t, force, float(np.max(np.abs(np.interp(np.clip(t, 0.0, end), t, force))))

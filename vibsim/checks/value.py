@@ -111,7 +111,7 @@ def _by_level(name: str, place: value_numbers.Place) -> Floats:
         return np.stack(value_numbers.samples(place), axis=-1)
     time, data = place.t, place.data()
     if place.step is not None and data is not None:
-        index = place.step // int(np.asarray(data.attrs["every"]))
+        index = place.step // data.whole("every")
         time = float(data["t"][index]) if index < len(data["t"]) else place.t
     rows = (replace(place, level=level, t=time, step=None) for level in place.levels)
     return np.stack([value_numbers.value(name, row) for row in rows], axis=-1)

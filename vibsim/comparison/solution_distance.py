@@ -19,10 +19,10 @@ from vibsim.convergence.thresholds import ABOVE_ROUND_OFF
 from vibsim.core.array_types import Floats
 from vibsim.core.vocabulary import CENTRED, plain_name
 from vibsim.experiment.schema.checks import EqualCheck
+from vibsim.experiment.sweep_columns import option_groups
 from vibsim.models import ENERGIES
-from vibsim.observe.common_grid import whole
 from vibsim.observe.member_block import MemberBlock, energy_at_start, stored_or_nan
-from vibsim.observe.predicted_oscillation import is_simple, natural_frequency, steppers
+from vibsim.observe.predicted_oscillation import equilibrium, is_simple, natural_frequency
 
 
 @dataclass(frozen=True)
@@ -70,14 +70,18 @@ def rounding(block: MemberBlock, level: int, name: str, scheme: int, floor: Floa
         return np.broadcast_to(floor, block.shape[1:])
     result = np.full(block.shape[1:], np.nan)
     steps, numbers = _numbers(block, level)
-    for options, where in steppers(block, scheme):
+    for options, where in option_groups(block.experiment, scheme, block.columns):
         stepper = block.experiment.schemes[scheme].method.stepper(options)
-        w, dt, u, v = (x[where] for x in numbers)
-        bounds = theory.rounding_bound(stepper, w, dt, u, v, steps)
+        w, dt, u, v, rest = (x[where] for x in numbers)
+        of_swing = theory.rounding_bound(stepper, w, dt, u, v, steps)
+        # numbers are rounded at their distance from 0, not from the place of rest
+        of_rest = theory.rounding_bound(stepper, w, dt, rest, 0.0 * v, steps)
+        bounds = [x + np.where(rest == 0.0, 0.0, y) for x, y in zip(of_swing, of_rest, strict=True)]
         # the centred difference divides the rounding errors of two positions by 2 dt
         bounds_of_state = bounds[int(plain == block.model.velocity)]
         result[where] = bounds[0] / dt if name.endswith(CENTRED) else bounds_of_state
-    return result
+    # the theory is that of an oscillation
+    return np.where(np.isnan(natural_frequency(block)), floor, result)
 
 
 def discrete(block: MemberBlock, level: int, name: str, scheme: int) -> Floats:
@@ -87,15 +91,16 @@ def discrete(block: MemberBlock, level: int, name: str, scheme: int) -> Floats:
     """
     record, model = block.records[level], block.model
     series = np.full((*block.shape[1:], len(record["t"])), np.nan)
-    if not is_simple(block) or name not in (model.position, model.velocity):
+    is_known = is_simple(block) and not block.adaptive[scheme]
+    if not is_known or name not in (model.position, model.velocity):
         return series
     steps, numbers = _numbers(block, level)
-    n = np.arange(len(record["t"])) * whole(record, "every")
-    for options, where in steppers(block, scheme):
-        w, dt, u, v = (x[where] for x in numbers)
+    n = np.arange(len(record["t"])) * record.whole("every")
+    for options, where in option_groups(block.experiment, scheme, block.columns):
+        w, dt, u, v, rest = (x[where] for x in numbers)
         stepper = block.experiment.schemes[scheme].method.stepper(options)
-        states = theory.discrete(stepper, w, dt, u, v, n, steps=steps)
-        series[where] = states[int(name == model.velocity)]
+        swing, velocity = theory.discrete(stepper, w, dt, u, v, n, steps=steps)
+        series[where] = velocity if name == model.velocity else swing + rest[:, None]
     return series
 
 
@@ -110,11 +115,14 @@ def discrete_error(block: MemberBlock, level: int, name: str) -> Floats:
 
 
 def _numbers(block: MemberBlock, level: int) -> tuple[int, tuple[Floats, ...]]:
-    """Return the number of steps, and w, dt and the initial position and velocity, each of shape (case,)."""
+    """Return the number of steps, and w, dt, the start and the place of rest r, each of shape (case,).
+
+    The start is the initial position from r, and the initial velocity.
+    """
     model, initial = block.model, block.group.initial
-    steps = block.grid.steps[block.grid.levels.index(level)]
-    start = initial[model.position], initial[model.velocity]
-    numbers = natural_frequency(block), block.group.end / steps, *start
+    steps, rest = block.grid.steps[block.grid.levels.index(level)], equilibrium(block)
+    start = initial[model.position] - rest, initial[model.velocity]
+    numbers = natural_frequency(block), block.group.end / steps, *start, rest
     return steps, tuple(np.broadcast_to(x, block.shape[1:]) for x in numbers)
 
 
@@ -124,7 +132,7 @@ def exact_series(block: MemberBlock, level: int, name: str) -> Floats:
     shape = (*block.shape, len(record["t"]))
     if plain == "energy" and model.conservative:
         return np.broadcast_to(energy_at_start(record)[..., None], shape)
-    n = np.arange(shape[-1]) * whole(record, "every")
+    n = np.arange(shape[-1]) * record.whole("every")
     t = n * (block.group.end / block.grid.steps[block.grid.levels.index(level)])[:, None]
     if model.exact is not None:
         states = block.group.exact(model, t)
@@ -142,6 +150,5 @@ def _accuracy_of_exact(block: MemberBlock, level: int, name: str, values: Floats
     record, bound = block.records[level], f"{plain_name(name)}_exact_error"
     if bound in record:
         return np.asarray(record[bound], dtype=float)
-    phase = natural_frequency(block) * block.group.end
     size = np.max(np.abs(np.nan_to_num(values)), axis=-1)
-    return np.asarray(SPACING_AT_ONE * (1.0 + phase) * size * block.magnified)
+    return np.asarray(SPACING_AT_ONE * (1.0 + block.phase) * size * block.magnified)

@@ -21,7 +21,6 @@ from vibsim.core.vocabulary import LEVELS_OF_AN_ORDER
 from vibsim.elementary import on_arrays
 from vibsim.experiment.value_names import VALUES
 from vibsim.observe import oscillation, predicted_oscillation, spectrum, steady_state
-from vibsim.observe.common_grid import whole
 from vibsim.observe.event_at_end import may_jump
 from vibsim.observe.member_block import MemberBlock, energy_at_start, stored_or_nan
 
@@ -72,7 +71,7 @@ class Place:
         grid, model = self.block.grid, self.block.model
         if VALUES[name].is_sample:
             data = self.data()
-            t, every = (grid.t, grid.stride) if data is None else (data["t"], whole(data, "every"))
+            t, every = (grid.t, grid.stride) if data is None else (data["t"], data.whole("every"))
             is_last = grid.end_included and _index(self, t, every) == len(t) - 1
             depends = is_last and may_jump(model, self.quantity)
         else:
@@ -142,7 +141,7 @@ def _sample(p: Place, data: Record) -> Floats:
     """Return the value of a series at a time, by default the last one."""
     if p.quantity not in data:
         return p.missing
-    index = _index(p, data["t"], whole(data, "every"))
+    index = _index(p, data["t"], data.whole("every"))
     return p.missing if index is None else np.asarray(data[p.quantity][..., index], dtype=float)
 
 
@@ -196,7 +195,7 @@ def _fall(number: Number) -> Number:
 @_needs_data
 def _own_norm(p: Place, data: Record) -> Floats:
     """Return ``sqrt(dt sum (u_exact - u)^2 / T)`` over the stored points of a level (vibration text, section 2.2)."""
-    exact = exact_series(p.block, whole(data, "level"), p.quantity)
+    exact = exact_series(p.block, data.whole("level"), p.quantity)
     error = exact - np.asarray(data[p.quantity], dtype=float)
     return np.asarray(np.sqrt(np.sum(error**2, axis=-1) / (error.shape[-1] - 1)))
 
@@ -205,7 +204,7 @@ def _own_norm(p: Place, data: Record) -> Floats:
 def _second_difference(p: Place, data: Record) -> Floats:
     """Return ``E = [D_tD_t u]/u''`` of the exact position by least squares (vibration text, exercise 7)."""
     position = p.block.model.position
-    if f"{position}_exact" not in data or whole(data, "every") != 1:
+    if f"{position}_exact" not in data or data.whole("every") != 1:
         return p.missing
     exact = np.asarray(data[f"{position}_exact"])
     inside = exact[..., 1:-1]

@@ -80,6 +80,10 @@ class Record:
         values = np.ravel(np.asarray(attrs["flag_values"])).tolist()
         return dict(zip(values, str(attrs["flag_meanings"]).split(), strict=True))
 
+    def whole(self, name: str) -> int:
+        """Return an attribute that is an integer, also where a file has an array."""
+        return int(np.asarray(self.attrs[name]).item())
+
     def place(self, dim: str, value: int) -> int:
         """Return the index of a value in a coordinate of whole numbers."""
         return int(np.flatnonzero(np.asarray(self[dim]) == value)[0])

@@ -5,6 +5,7 @@ from __future__ import annotations
 from vibsim.core.vocabulary import VECTORS, is_error_part
 from vibsim.experiment.data import ExperimentSpec
 from vibsim.experiment.value_names import MOST_EVENTS
+from vibsim.models.base import has_solution
 
 SMALL = 200_000
 """Largest number of samples of one variable for which ``samples: auto`` stores every step of a level."""
@@ -18,6 +19,8 @@ MOST_EXTREMA = 512
 """Largest number of peaks, and of troughs, stored per scheme and member."""
 FEWEST_EXTREMA = 16
 """Number of extrema stored per scheme and member however many members there are."""
+MOST_REFERENCES = 1024
+"""Largest number of members for which reference solutions are computed."""
 RUNNING = "_running_max"
 """Suffix of the series with the running maximum of the absolute energy deviation, over all steps so far."""
 _PEAK_VALUE = "phase_error_slope"
@@ -96,6 +99,14 @@ def is_bounded(experiment: ExperimentSpec) -> bool:
     """Tell whether the storage of `experiment` is bounded because it is large (`is_lean`)."""
     coarsest = experiment.steps(experiment.levels[0])
     return is_lean(experiment.samples, coarsest, experiment.trajectories)
+
+
+def stores_references(experiment: ExperimentSpec) -> bool:
+    """Tell whether levels store reference solutions: no exact solution is known, but one can be computed."""
+    model = experiment.model.definition
+    # in a chain the initial values depend on the level
+    is_needed = model.exact is None and has_solution(model) and experiment.chain == 1
+    return is_needed and experiment.members <= MOST_REFERENCES and not is_bounded(experiment)
 
 
 def checked_quantities(experiment: ExperimentSpec) -> tuple[str, ...]:

@@ -44,6 +44,8 @@ from vibsim.formula.tree import (
 HALVINGS = 48
 MOST_INTERVALS = 2**14
 """Largest number of intervals that are kept: those with the largest possible deviations."""
+MOST_GAPS = 2**21
+"""Largest number of gaps between sample times that are searched at once; larger runs have wider gaps first."""
 PULSE_RATIO = 2.0
 """A pulse deviates from the values around it by more than this multiple of their range, ..."""
 SMALLEST_PULSE = 1e-9

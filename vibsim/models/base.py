@@ -163,7 +163,9 @@ class Model:
     potential_energy: Formula
     energy_unit: str
     linear: bool
+    """Whether there is one coordinate, whose force is linear in it with a constant coefficient."""
     conservative: bool
+    """Whether the energy is constant."""
     natural_frequency: Callable[[Numbers], Any]
     """Angular frequency of small oscillations [rad per unit of time], from the parameters; the lowest if several."""
     turn: float | None = None
@@ -386,9 +388,19 @@ def has_solution(model: Model) -> bool:
     return model.exact is not None or (model.events is None and model.loaded is None)
 
 
+def varies_in_time(model: Model) -> bool:
+    """Tell whether the force of a model depends on time, other than by a table."""
+    return any("t" in tree(model, row).names for row in model.forces)
+
+
 def parameter_names(model: Model) -> tuple[str, ...]:
     """Return the names of the parameters in formulas, in the order of the engine."""
     return tuple(parameter.name for parameter in model.parameters)
+
+
+def by_name(parameters: Iterable[Parameter], numbers: Numbers) -> dict[str, Any]:
+    """Return the values of parameters by their names in formulas, from `numbers` by their keys."""
+    return {row.name: numbers[row.key] for row in parameters}
 
 
 def natural_end(model: Model, periods: float, parameters: Numbers) -> Any:
@@ -412,9 +424,9 @@ def looked_up(
 def table_end(model: Model, parameters: Numbers) -> Any:
     """Return the time at which a motion reaches the last point of the table, at the speed of `Lookup.place`."""
     assert model.lookup is not None
-    numbers = {row.name: parameters[row.key] for row in model.parameters}
+    numbers = {**by_name(model.parameters, parameters), "t": 1.0}
     with np.errstate(divide="ignore"):
-        speed = np.asarray(values(tree(model, model.lookup.place), {**numbers, "t": 1.0}), float)
+        speed = np.asarray(values(tree(model, model.lookup.place), numbers), float)
         return model.lookup.table.last / speed
 
 

@@ -34,7 +34,14 @@ from vibsim.formula import (
     to_formula,
     values,
 )
-from vibsim.models.base import FormulaField, Model, Numbers, Parameter, declared_parameters
+from vibsim.models.base import (
+    FormulaField,
+    Model,
+    Numbers,
+    Parameter,
+    by_name,
+    declared_parameters,
+)
 from vibsim.models.events import Crossings, Friction
 from vibsim.models.shared.crossings import crossings, described
 from vibsim.models.shared.linear_motion import friction_motion
@@ -187,8 +194,10 @@ def _friction(user: Written, forces: Forces) -> dict[str, Any]:
     """
 
     def held(t: Floats, initial: Numbers, parameters: Numbers) -> dict[str, Floats]:
-        numbers = {row.name: parameters[row.key] for row in user.parameters}
+        numbers = by_name(user.parameters, parameters)
         stiffness = values(forces.stiffness, numbers)
+        # the motion is not known where the spring does not pull back
+        stiffness = np.where(stiffness > 0.0, stiffness, np.nan)
         w = np.sqrt(stiffness / numbers["m"])
         u, v = friction_motion(t, w, numbers["b"] / stiffness, initial["u"], initial["v"])
         return {"u": u, "v": v}

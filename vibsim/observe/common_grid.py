@@ -61,8 +61,8 @@ def common_grid(records: Mapping[int, Record]) -> Grid:
     if not records:
         raise VibsimError("analysis needs the data of at least one level")
     levels = tuple(sorted(records))
-    steps = tuple(whole(records[level], "steps") for level in levels)
-    every = tuple(whole(records[level], "every") for level in levels)
+    steps = tuple(records[level].whole("steps") for level in levels)
+    every = tuple(records[level].whole("every") for level in levels)
     unit = math.lcm(*steps)
     spacings = [e * (unit // n) for e, n in zip(every, steps, strict=True)]
     stride = math.lcm(*spacings)
@@ -93,18 +93,13 @@ def take_all(grid: Grid, record: Record, name: str) -> Floats:
 
 
 def _stride(grid: Grid, record: Record) -> int:
-    return grid.strides[grid.levels.index(whole(record, "level"))]
-
-
-def whole(record: Record, name: str) -> int:
-    """Return an integer attribute of a Record."""
-    return int(np.asarray(record.attrs[name]).item())
+    return grid.strides[grid.levels.index(record.whole("level"))]
 
 
 def _step(record: Record) -> Floats:
     """Return dt, shape (case,) if the end time differs between members, otherwise (1,)."""
     t = record["t"]
-    fraction = float(t[-1]) / ((np.size(t) - 1) * whole(record, "every"))
+    fraction = float(t[-1]) / ((np.size(t) - 1) * record.whole("every"))
     end = record["end"] if "end" in record else np.ones(1)
     return np.asarray(fraction * end, dtype=np.float64)
 
@@ -130,7 +125,7 @@ def _faults(experiment: Experiment, level: int, record: Record, other: Record) -
     if level not in experiment.levels:
         yield f"the experiment has levels {list(experiment.levels)}"
         return
-    steps = whole(record, "steps")
+    steps = record.whole("steps")
     if steps != experiment.steps(level):
         yield f"{steps} steps instead of {experiment.steps(level)}"
     if str(record.attrs.get("model", model.kind)) != model.kind:

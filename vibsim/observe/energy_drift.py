@@ -98,8 +98,13 @@ def drift_at(block: MemberBlock, level: int, name: str = "energy_deviation") -> 
         floor = np.maximum(floor, _of_steps(block, level) * size * condition)
     # for an adaptive scheme the floor contains its tolerance, which is not round-off
     floor[block.adaptive] = SPACING_AT_ONE * size[block.adaptive]
-    w = np.asarray(record["natural_frequency"], dtype=float)
-    return drift_of(running, ratio, initial, floor, w * block.group.end / (2.0 * np.pi), deviation)
+    w, exact = (
+        stored_or_nan(record, name, block.shape[1:])
+        for name in ("natural_frequency", "exact_period")
+    )
+    end = block.group.end
+    periods = np.where(np.isnan(w), end / exact, w * end / (2.0 * np.pi))
+    return drift_of(running, ratio, initial, floor, periods, deviation)
 
 
 def _held(series: Floats, members: Flags) -> Floats:
@@ -142,7 +147,7 @@ def _of_steps(block: MemberBlock, level: int) -> Floats:
     kinds = [scheme.method for scheme in block.experiment.schemes]
     plain = np.array([kind.round_off is round_off for kind in kinds])
     index = block.grid.levels.index(level)
-    p, steps = block.omega_dt[:, index], block.grid.steps[index]
+    p, steps = block.radians[:, index], block.grid.steps[index]
     size = th.STEPPED * UNIT_ROUND_OFF * (steps * p + steps**0.5 * p * p)
     return np.where(plain[:, None], np.minimum(size, th.MOST_ROUNDED), 0.0) / ABOVE_ROUND_OFF
 
@@ -153,7 +158,7 @@ def drift_of(
     energy: Floats,
     floor: Floats,
     periods: Floats,
-    deviation: Floats | None = None,
+    deviation: Floats,
 ) -> Drift:
     """Return the growth of the energy error.
 
@@ -166,41 +171,34 @@ def drift_of(
     periods
         Length of the run in natural periods, shape (case,).
     deviation
-        The deviation with its sign, in the shape of M; None: only M is used.
+        The deviation with its sign, in the shape of M.
     """
     samples = running.shape[-1] - 1
     end = np.fmax.reduce(running, axis=-1)
     with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
         change = on_arrays.log(np.abs(ratio))
-        means = _means(running)
-        rise, k = _rise(means)
         fall, k_log = _power(np.abs(change))
         last, left = change[..., -1], np.abs(ratio * energy[..., None])[..., -1]
-        gone = (left < th.SMALLEST_NORMAL) & (np.abs(energy) > th.SMALLEST_NORMAL)
-        last_rise = _last_rise(running)
+        means, so_far = _means(running), _range(deviation)
+        of_range = _means(so_far)
+        (rise, k), (range_rise, range_k) = _rise(means), _rise(of_range)
+        # the last rise of an oscillation with several frequencies may be a stair
+        moves = _shifts_the_range(deviation)
+        stops = (_last_rise(running) < th.STILL_WIDENS * rise) | ~moves
+        range_stops = (_last_rise(so_far) < th.STILL_WIDENS * range_rise) | ~moves
+    gone = (left < th.SMALLEST_NORMAL) & (np.abs(energy) > th.SMALLEST_NORMAL)
     size = np.where(np.isfinite(end) & (end > 0), end, 1.0)
     allowed = np.broadcast_to(ABOVE_ROUND_OFF * floor, end.shape)
     still = _is_still(rise, k, size)
-    # a small rise may be the last stair of an oscillation with several frequencies
-    stops = last_rise < th.STILL_WIDENS * rise
-    if deviation is not None:
-        moves = _shifts_the_range(deviation)
-        stops |= ~moves
-    has_stopped = (rise < th.SMALL_RISE * size) & stops
-    if deviation is not None:
-        # M is constant until a drift exceeds the opposite swing of an oscillation; shortly after, its k is arbitrary
-        so_far = _range(deviation)
-        of_range = _means(so_far)
-        range_rise, range_k = _rise(of_range)
-        overtakes = _is_near(k, 2) & _is_near(range_k, 1)
-        widens = still | overtakes | ~(_is_near(k, 1) | _is_near(k, 2))
-        widens &= samples >= th.LEAST_PER_PERIOD * periods
-        widens &= ~_is_still(range_rise, range_k, size)
-        stops = _last_rise(so_far) < th.STILL_WIDENS * range_rise
-        has_stopped = np.where(widens, stops | ~moves, has_stopped)
-        means = np.where(widens[..., None], of_range, means)
-        rise, k = _rise(means)
-        still &= ~widens
+    # M is constant until a drift exceeds the opposite swing of an oscillation; shortly after, its k is arbitrary
+    overtakes = _is_near(k, 2) & _is_near(range_k, 1)
+    widens = still | overtakes | ~(_is_near(k, 1) | _is_near(k, 2))
+    widens &= samples >= th.LEAST_PER_PERIOD * periods
+    widens &= ~_is_still(range_rise, range_k, size)
+    has_stopped = np.where(widens, range_stops, (rise < th.SMALL_RISE * size) & stops)
+    means = np.where(widens[..., None], of_range, means)
+    rise, k = np.where(widens, range_rise, rise), np.where(widens, range_k, k)
+    still &= ~widens
     closer = ~(np.abs(k_log - 1.0) >= np.abs(k - 1.0))
     exponential = (np.abs(last) > th.LARGE_CHANGE) & _is_near(k_log, 1) & closer
     short = (periods < th.LEAST_PERIODS) | (samples < th.LEAST_SAMPLES)

@@ -77,6 +77,26 @@ class MemberBlock:
         schemes, cases, _ = self.failed.shape
         return schemes, cases
 
+    @property
+    def phase(self) -> Floats:
+        """Duration of the run in radians, ``w T``, shape (c,).
+
+        Without small oscillations it is that of the exact period; for a smooth motion without a period 1, else NaN.
+        """
+        w, period = (
+            stored_or_nan(self.finest, name, self.shape[1:])
+            for name in ("natural_frequency", "exact_period")
+        )
+        least = 1.0 if self.model.events is None else np.nan
+        own = np.fmax(2.0 * np.pi / period * self.group.end, least)
+        return np.where(np.isnan(w), own, w * self.group.end)
+
+    @property
+    def radians(self) -> Floats:
+        """``w dt``, with w as in `phase`, shape (c, l)."""
+        own = self.phase[:, None] / np.array(self.grid.steps)
+        return np.where(np.isnan(self.omega_dt), own, self.omega_dt)
+
     def series(self, name: str) -> list[Floats]:
         """Return a quantity at every level, coarse to fine, each of shape (s, c, t); NaN if it is not stored.
 
@@ -113,8 +133,6 @@ class MemberBlock:
             exact = self.exact[plain][None]
         elif self.model.conservative and plain == "energy":
             exact = energy_at_start(self.finest)[..., None]
-        elif self.model.conservative and plain == "energy_deviation":
-            return np.zeros((1, 1, 1))
         else:
             t = self.grid.times(self.group.end)
             known = known_values(self.model, plain, self.exact, t, self.group)
@@ -171,7 +189,7 @@ class MemberBlock:
         relative = self.relative_floor
         if name.endswith(CENTRED):
             with np.errstate(divide="ignore"):
-                relative = relative + SPACING_AT_ONE / self.omega_dt
+                relative = relative + SPACING_AT_ONE / self.radians
         # for members that grow without bound the floor overflows
         with np.errstate(over="ignore", invalid="ignore"):
             computed = relative * (size * self.magnified)[..., None]

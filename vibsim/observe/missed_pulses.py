@@ -11,10 +11,10 @@ from vibsim.apriori.table_corners import has_tables, table_pulses
 from vibsim.core.array_types import Flags, Floats
 from vibsim.core.record import Record, Variable
 from vibsim.formula import Pulses
-from vibsim.models import Model
-from vibsim.observe.thresholds import MOST_GAPS
+from vibsim.formula.jumps import MOST_GAPS
+from vibsim.models.base import Model, by_name, varies_in_time
 from vibsim.simulation.members import Members
-from vibsim.simulation.reference.one_sided_forces import pulses_of_force, varies_in_time
+from vibsim.simulation.reference.one_sided_forces import pulses_of_force
 
 AROUND = np.arange(-2, 4)  # points around a pulse
 
@@ -30,10 +30,8 @@ class Missed:
 
 def missed_pulses(model: Model, finest: Record, group: Members) -> Missed:
     """Return a pulse of the force between the points of the finest level, which include those of all other levels."""
-    parameters = {
-        row.name: np.asarray(group.parameters[row.key], dtype=float) for row in model.parameters
-    }
-    steps = int(np.asarray(finest.attrs["steps"]).item())
+    parameters = by_name(model.parameters, group.parameters)
+    steps = finest.whole("steps")
     of_tables = table_pulses(model, parameters, group.end, steps)
     in_tables = np.isfinite(of_tables.time)
     if not varies_in_time(model):
@@ -64,7 +62,7 @@ def _of_formulas(
         at = states[:, scheme[:, None], np.arange(cases)[:, None], np.clip(place, 0, samples)]
         return pulses_of_force(model, parameters, at, t, smooth=smooth)
 
-    gaps = steps = int(np.asarray(finest.attrs["steps"]).item())
+    gaps = steps = finest.whole("steps")
     while cases * gaps > MOST_GAPS and gaps % 2 == 0:
         gaps //= 2
     t = np.arange(gaps + 1) * (group.end / gaps)[:, None]

@@ -2,12 +2,12 @@ r"""Measured properties of an oscillation: growth, frequency, phase error.
 
 They are measured on the peaks that were found at every step; for a linear, conservative model with all steps stored, on
 the recurrence that the steps satisfy. On a linear problem a scheme with one principal pair of roots satisfies
-``u^(n+1) = s u^n - q u^(n-1)``; growth and frequency are those of the roots of ``x^2 - s x + q`` (Prony's method). s
-and q are fitted to the second half of the run, where the parasitic roots of a multistep method have decayed (if they
-have not decayed to rounding, there is no such recurrence). Each step is weighted by the inverse of its size, so that
-the end of a growing run does not dominate. Interpolated peaks have an error of O(dt^3), and there are none if the sign
-changes at every step; the roots have round-off of about eps/(w dt)^2. Neither the exact solution nor the scheme need be
-known.
+``u^(n+1) = s u^n - q u^(n-1)``, with u measured from the place of rest; growth and frequency are those of the roots of
+``x^2 - s x + q`` (Prony's method). s and q are fitted to the second half of the run, where the parasitic roots of a
+multistep method have decayed (if they have not decayed to rounding, there is no such recurrence). Each step is weighted
+by the inverse of its size, so that the end of a growing run does not dominate. Interpolated peaks have an error of
+O(dt^3), and there are none if the sign changes at every step; the roots have round-off of about eps/(w dt)^2. Neither
+the exact solution nor the scheme need be known.
 
 Shapes are (scheme, case). Numbers that do not exist are NaN: growth by peaks needs two peaks.
 
@@ -29,7 +29,7 @@ from vibsim.elementary import on_arrays
 from vibsim.experiment.storage import FEWEST_EXTREMA
 from vibsim.observe import thresholds as th
 from vibsim.observe.member_block import MemberBlock, stored_or_nan
-from vibsim.observe.predicted_oscillation import is_simple, natural_frequency
+from vibsim.observe.predicted_oscillation import equilibrium, is_simple, natural_frequency
 
 
 def growth_factor(record: Record) -> Floats:
@@ -81,13 +81,14 @@ def growth_over_run(block: MemberBlock, record: Record) -> Floats:
 
 def has_recurrence(block: MemberBlock, level: int) -> bool:
     """Tell whether a recurrence can be fitted to the steps of a level: a linear model, with every step stored."""
-    return is_simple(block) and int(np.asarray(block.records[level].attrs["every"])) == 1
+    return is_simple(block) and block.records[level].whole("every") == 1
 
 
 def _recurrence(block: MemberBlock, level: int) -> Recurrence | None:
     if not has_recurrence(block, level):
         return None
-    return fit_recurrence(np.asarray(block.records[level][block.model.position], dtype=float))
+    position = np.asarray(block.records[level][block.model.position], dtype=float)
+    return fit_recurrence(position - equilibrium(block)[:, None])
 
 
 def _step(block: MemberBlock, level: int) -> Floats:

@@ -14,7 +14,8 @@ import numpy as np
 from vibsim import theory
 from vibsim.apriori.stability_limits import limit_of
 from vibsim.core.array_types import Floats, Integers
-from vibsim.experiment import sweep_columns
+from vibsim.experiment.sweep_columns import option_groups
+from vibsim.models.shared.free import free_oscillation
 from vibsim.observe.member_block import MemberBlock
 from vibsim.schemes import Options, Scheme
 
@@ -24,22 +25,13 @@ def is_simple(block: MemberBlock) -> bool:
     return block.model.linear and block.model.conservative
 
 
-def steppers(block: MemberBlock, scheme: int) -> list[tuple[Options, Integers | slice]]:
-    """Return the options of one scheme, each with its members; empty for an adaptive scheme."""
-    if block.adaptive[scheme]:
-        return []
-    groups = sweep_columns.option_groups(block.experiment, scheme, block.columns)
-    return [(o, where if len(groups) > 1 else slice(None)) for o, where in groups]
-
-
-def of_schemes(
-    block: MemberBlock, function: Callable[[Scheme, Options, Integers | slice], Any]
-) -> Floats:
+def of_schemes(block: MemberBlock, function: Callable[[Scheme, Options, Integers], Any]) -> Floats:
     """Return the values of a function of scheme, options and the members with these options."""
     result = np.full(block.shape, np.nan)
-    for i, scheme in enumerate(block.experiment.schemes):
-        for options, where in steppers(block, i):
-            result[i, where] = function(scheme.method, options, where)
+    for i in np.flatnonzero(~block.adaptive).tolist():
+        method = block.experiment.schemes[i].method
+        for options, where in option_groups(block.experiment, i, block.columns):
+            result[i, where] = function(method, options, where)
     return result
 
 
@@ -47,11 +39,9 @@ def _dominant(block: MemberBlock, level: int, which: int) -> Floats:
     """Return growth per period (`which` 0) or angle per step (1) of the dominant root."""
     p = _step(block, level)
 
-    def of_root(scheme: Scheme, options: Options, where: Integers | slice) -> Floats:
+    def of_root(scheme: Scheme, options: Options, where: Integers) -> Floats:
         values, back = np.unique(p[where], return_inverse=True)
-        return np.asarray(theory.dominant(scheme.stepper(options), values)[which], dtype=float)[
-            back
-        ]
+        return theory.dominant(scheme.stepper(options), values)[which][back]
 
     return of_schemes(block, of_root)
 
@@ -91,6 +81,12 @@ def _step(block: MemberBlock, level: int) -> Floats:
 def natural_frequency(block: MemberBlock) -> Floats:
     """Return w, shape (case,)."""
     return np.asarray(block.finest["natural_frequency"], dtype=np.float64)
+
+
+def equilibrium(block: MemberBlock) -> Floats:
+    """Return the place of rest of a model to which the theory applies, 0 if it has none, shape (case,)."""
+    motion = free_oscillation(block.model, block.group.initial, block.group.parameters)
+    return np.broadcast_to(np.nan_to_num(motion.equilibrium), block.shape[1:])
 
 
 def limits(block: MemberBlock) -> Floats:

@@ -47,11 +47,15 @@ ROUNDINGS = 8.0
 
 
 def samples_a_period(block: MemberBlock) -> int:
-    """Return the number of intervals of the common grid in a period of the force; 0 if no force is named."""
+    """Return the number of intervals of the common grid in a period of the force.
+
+    0 if no force is named, or the common times do not divide its periods.
+    """
     time = block.experiment.time
     if time.frequency is None or time.periods is None:
         return 0
-    return (len(block.grid.t) - 1) // round(time.periods)
+    count, rest = divmod(len(block.grid.t) - 1, round(time.periods))
+    return 0 if rest else count
 
 
 def harmonic(block: MemberBlock, level: int, quantity: str, back: int = 0) -> Complexes:

@@ -39,11 +39,6 @@ INSTANT = 1e-6  # a time in units of 1/w over which the motion is linear in time
 # the shift in time (`sensitivity`) is then so large that the rounding of the disturbed solution dominates. [convention]
 NEAR_REST = 1e-3
 
-# ---- Pulses
-
-# Largest number of gaps between points that are searched; larger runs are searched with wider gaps first. [convention]
-MOST_GAPS = 2**21
-
 # ---- Energy drift
 
 LEAST_PERIODS = 4.0  # T/8 is then half a period, the period of the energy error [derived]

@@ -13,9 +13,9 @@ from typing import TYPE_CHECKING
 
 from vibsim.core.vocabulary import LEVELS_OF_AN_ORDER
 from vibsim.experiment.cost import PLAIN_WORK, LevelCost, analysis_disk
-from vibsim.experiment.storage import is_bounded
-from vibsim.formula.jumps import held
-from vibsim.models import has_solution, tree
+from vibsim.experiment.storage import is_bounded, stores_references
+from vibsim.formula.jumps import MOST_GAPS, held
+from vibsim.models.base import tree, varies_in_time
 
 if TYPE_CHECKING:
     from vibsim.experiment import Experiment
@@ -40,13 +40,9 @@ LEVEL_BYTES, FEW_LEVELS, MANY_LEVELS = 25 * 10**6, 4, 7
 """Memory of each further level of such an analysis, for level counts between these two."""
 VARIABLE_BYTES, FEW_SERIES = 2 * 10**6, 12
 """Memory of the netCDF library's buffers for each series beyond the first `FEW_SERIES`."""
-MOST_GAPS = 2**21
-"""Most gaps between points that are searched at a time (`vibsim.observe.thresholds`)."""
 LONG_SECONDS = 5.0
 """A reference solution that takes longer is announced in a note."""
 
-MOST_REFERENCES = 1024
-"""No reference is computed for sweeps with more members (`vibsim.simulation.level`)."""
 STEPS_A_PERIOD, FEWEST_STEPS, MOST_STEPS = 8, 256, 2048
 """Steps of the last reference solution: per period, and in total; the coarser ones together have as many again."""
 STEP_SECONDS = (0.5e-3, 0.18e-3)
@@ -63,10 +59,9 @@ CORNER_MEMBER_PART = 0.2
 
 def reference_seconds(experiment: Experiment) -> float:
     """Return the time of the reference solutions of an experiment [core seconds]; 0 if it computes none."""
-    model = experiment.model.definition
-    is_known = model.exact is not None or not has_solution(model) or experiment.chain > 1
-    if is_known or experiment.members > MOST_REFERENCES or is_bounded(experiment):
+    if not stores_references(experiment):
         return 0.0
+    model = experiment.model.definition
     frequency = model.highest_frequency or model.natural_frequency
     periods = experiment.time.end * float(frequency(experiment.model.parameters)) / (2.0 * math.pi)
     needed = STEPS_A_PERIOD * periods if math.isfinite(periods) else 0.0
@@ -87,9 +82,7 @@ def reference_seconds(experiment: Experiment) -> float:
 
 def gaps(experiment: Experiment, levels: Sequence[LevelCost]) -> int:
     """Return the number of gaps between points of the finest level that are searched at a time for a force pulse."""
-    model = experiment.model.definition
-    forces = () if model.loaded is not None else (tree(model, row) for row in model.accelerations)
-    is_driven = any("t" in force.names for force in forces)
+    is_driven = varies_in_time(experiment.model.definition)
     return min(experiment.members * levels[-1].steps, MOST_GAPS) if is_driven else 0
 
 

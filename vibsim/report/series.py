@@ -8,7 +8,7 @@ import numpy as np
 
 from vibsim.core.array_types import Floats
 from vibsim.formula import values
-from vibsim.models.base import Formula, Model, tree
+from vibsim.models.base import Formula, Model, by_name, tree
 from vibsim.report.data import Ladder, Results, pretty_unit
 from vibsim.simulation.members import members
 
@@ -27,7 +27,7 @@ def numbers_of(record: Results, case: int) -> tuple[dict[str, Floats], dict[str,
 def parameters_of(record: Results, case: int) -> dict[str, Floats]:
     """Return the parameters of a member by their names in formulas."""
     by_key, _ = numbers_of(record, case)
-    return {row.name: by_key[row.key] for row in record.model.parameters}
+    return by_name(record.model.parameters, by_key)
 
 
 def on_level(ladder: Ladder, level: int) -> Floats | None:

@@ -22,7 +22,7 @@ from vibsim.experiment.storage import (
     is_bounded,
     stored_series,
 )
-from vibsim.models import BUDGET, ENERGIES, Model, centred, has_budget, has_solution
+from vibsim.models import BUDGET, ENERGIES, Model, centred, has_budget
 from vibsim.simulation.derived import derived
 from vibsim.simulation.members import Members, members
 from vibsim.simulation.reference.solve import method, reference
@@ -36,8 +36,6 @@ if TYPE_CHECKING:
 
 STATUS = ("ok", "non_finite")
 """Meaning of the variable ``status``."""
-MOST_REFERENCES = 1024
-"""Largest number of members for which reference solutions are computed if the exact solution is not known."""
 
 _ENERGY_WORDS = {
     "kinetic_energy": "kinetic energy",
@@ -241,10 +239,8 @@ def _exact(
     """Return the exact states, or reference solutions if they are not known."""
     model = experiment.model.definition
     if model.exact is None:
-        few = has_solution(model) and experiment.members <= MOST_REFERENCES
-        # in a chain the initial values depend on the level
-        few = few and experiment.chain == 1
-        return _computed(model, group, number / steps) if few else {}
+        is_computed = storage.stores_references(experiment)
+        return _computed(model, group, number / steps) if is_computed else {}
     exact = group.exact(model, number * (group.end / steps)[:, None])
     rows = (
         (f"{row.name}_exact", exact[row.name], f"exact {row.long_name}", row.unit)

@@ -109,13 +109,13 @@ def product(a: ArrayLike, b: ArrayLike) -> Doubled:
     return Doubled(*two_product(np.asarray(a, dtype=float), np.asarray(b, dtype=float)))
 
 
-def stacked(numbers: Sequence[Any], shape: tuple[int, ...], axis: int = -1) -> Doubled:
-    """Return numbers, each broadcast to a shape, stacked along a new axis."""
+def stacked(numbers: Sequence[Any], shape: tuple[int, ...]) -> Doubled:
+    """Return numbers, each broadcast to a shape, stacked along a new last axis."""
     parts = [doubled(number) for number in numbers]
     highs, lows = [part.high for part in parts], [part.low for part in parts]
     return Doubled(
-        np.stack([np.broadcast_to(x, shape) for x in highs], axis=axis),
-        np.stack([np.broadcast_to(x, shape) for x in lows], axis=axis),
+        np.stack([np.broadcast_to(x, shape) for x in highs], axis=-1),
+        np.stack([np.broadcast_to(x, shape) for x in lows], axis=-1),
     )
 
 

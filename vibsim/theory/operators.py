@@ -27,9 +27,9 @@ from numpy.typing import NDArray
 
 from vibsim.schemes.base import Stepper
 from vibsim.theory.arithmetic import characteristic
+from vibsim.theory.laurent import HALF
 from vibsim.theory.symbolic import expression, matrices, symbol
 
-HALF = Fraction(1, 2)
 NOTATION = MappingProxyType(
     {
         "D_t": "(u^(n+1/2) - u^(n-1/2))/dt",

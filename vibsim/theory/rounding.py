@@ -99,7 +99,10 @@ def rounding_bound(
 def _bounds(
     stepper: Stepper, w: Floats, dt: Floats, u_0: Floats, v_0: Floats, *, steps: int
 ) -> tuple[Floats, Floats]:
-    """Return the bounds for arrays of shape (case,): the largest term of the sum times the number of terms."""
+    """Return the bounds for arrays of shape (case,): the largest term of the sum times the number of terms.
+
+    The largest is that of the powers at `_points`.
+    """
     p = product(w, dt)
     exact = amplification(stepper, p)
     step, reading, start = _roundings(stepper, p.rounded)

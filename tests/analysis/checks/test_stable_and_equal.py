@@ -157,7 +157,7 @@ def test_of_several_coordinates_the_fastest_oscillation_decides_and_one_alone_sh
 ) -> None:
     """x rises and falls as it passes its energy to the wire and back, and the wire needs the smaller step."""
     # a reference solution says nothing of a limit
-    monkeypatch.setattr("vibsim.simulation.level.MOST_REFERENCES", 0)
+    monkeypatch.setattr("vibsim.experiment.storage.MOST_REFERENCES", 0)
     # w = sqrt(0.99), and 10 w along the wire: w dt = 0.62 and 6.2, which is beyond the limit 2.83 of rk4
     checks = [{"stable": True, "level": 6}, {"stable": True, "level": 8}, {"converges": "x"}]
     model = {"kind": "elastic_pendulum", "beta": 0.99, "Theta": 10}

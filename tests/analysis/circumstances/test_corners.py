@@ -166,7 +166,7 @@ def test_the_power_that_a_corner_leaves(
     monkeypatch: pytest.MonkeyPatch, model: dict[str, Any], time: float, power: float, words: str
 ) -> None:
     # a corner is found in what the levels computed, without a reference solution
-    monkeypatch.setattr("vibsim.simulation.level.MOST_REFERENCES", 0)
+    monkeypatch.setattr("vibsim.experiment.storage.MOST_REFERENCES", 0)
     found = corner(model)
     assert found[0] == pytest.approx(time, abs=0.02, nan_ok=True)
     assert found[1] == pytest.approx(power, nan_ok=True)

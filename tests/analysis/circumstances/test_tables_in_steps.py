@@ -12,6 +12,9 @@ from sweeps import simulated
 from vibsim import Experiment, Verdict, analyse, simulate, verdicts
 from vibsim.analysis import analyse_records
 from vibsim.apriori.formal_orders import left_to_the_mesh
+from vibsim.apriori.table_corners import table_corners
+from vibsim.models.table import Table
+from vibsim.models.vehicle import written
 
 pytestmark = pytest.mark.usefixtures("without_series")
 
@@ -206,3 +209,17 @@ def test_a_pulse_of_a_load_between_the_points_of_every_level_is_told(folder: Pat
     for verdict in judged(made):
         assert (verdict.status, verdict.reason) == ("INCONCLUSIVE", "non_smooth")
         assert "a pulse about 0.001 long near t = 3.002" in verdict.text
+
+
+def test_what_a_table_holds_behind_the_end_does_not_count() -> None:
+    """The error at corners is relative to the force of the run; a large bump later made it 1000 times too small."""
+    h = np.array([0.0, 0.0, 1.0, -1.0, 2.0, 0.0, 0.0, 0.0, 0.0])
+    later = np.concatenate([h, [0.0, 3000.0, 0.0, 0.0]])
+    columns = {"m": np.array([1.0]), "b": np.array([0.0]), "speed": np.array([1.0])}
+    end, dt = np.array([5.0]), np.array([0.9])
+    found = [
+        table_corners(written({}, (), Table(0.0, 1.0, heights)), columns, end, dt)
+        for heights in (h, later)
+    ]
+    np.testing.assert_array_equal(*found)
+    assert np.isfinite(found[0]).all()

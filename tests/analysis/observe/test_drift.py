@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from spring_runs import registered, spring
 
+from vibsim import Experiment, analyse, simulate, verdicts
 from vibsim.core.vocabulary import DRIFTS
 from vibsim.observe.energy_drift import drift_of
 from vibsim.observe.thresholds import STILL
@@ -27,7 +28,7 @@ def kind_of(deviation: Floats, periods: float = PERIODS, floor: float = 1e-15) -
     running = np.maximum.accumulate(np.abs(deviation))[None, None]
     one = np.ones((1, 1))
     ratio = 1.0 + deviation[None, None]
-    found = drift_of(running, ratio, one, floor * one, np.array([periods]))
+    found = drift_of(running, ratio, one, floor * one, np.array([periods]), deviation[None, None])
     return DRIFTS[int(found.kind[0, 0])], float(found.rate[0, 0])
 
 
@@ -63,6 +64,7 @@ def test_exponential_growth_and_decay_are_named_with_their_rate(change: float) -
         one,
         1e-15 * one,
         np.array([PERIODS]),
+        np.expm1(change * S)[None, None],
     )
     assert DRIFTS[int(found.kind[0, 0])] == "exponential"
     assert found.rate[0, 0] * PERIODS == pytest.approx(change, rel=1e-9)
@@ -91,7 +93,8 @@ def test_what_is_above_underflow_decides(end: float) -> None:
     running = np.where(S > 0, 1.0, 0.0)[None, None]
 
     def found(ratio: Floats) -> tuple[str, float]:
-        drift = drift_of(running, ratio[None, None], one, 1e-15 * one, np.array([PERIODS]))
+        ratio = ratio[None, None]
+        drift = drift_of(running, ratio, one, 1e-15 * one, np.array([PERIODS]), ratio - 1.0)
         return DRIFTS[int(drift.kind[0, 0])], float(drift.rate[0, 0]) * PERIODS
 
     decay = np.where(end >= S, np.exp(-700.0 * S / max(end, 0.01)), 0.0)
@@ -162,7 +165,8 @@ def test_a_range_that_stops_widening_shows_no_drift(stops: float, kind: str) -> 
 def test_an_overflow_of_one_member_is_no_warning() -> None:
     running = np.stack([1e-3 * S, np.where(S > 0.5, np.inf, 1e-3 * S)])[None]
     ones = np.ones((1, 2))
-    found = drift_of(running, 1.0 + running, ones, 1e-15 * ones, np.array([PERIODS, PERIODS]))
+    periods = np.array([PERIODS, PERIODS])
+    found = drift_of(running, 1.0 + running, ones, 1e-15 * ones, periods, running)
     assert [DRIFTS[int(code)] for code in found.kind[0]] == ["linear", "unclear"]
 
 
@@ -256,3 +260,34 @@ def test_the_last_time_counts_where_its_velocity_is_that_of_all_others() -> None
     assert found[2] == pytest.approx(np.max(energies[2, :-1]) / initial[2], rel=1e-12)
     assert found[3] == pytest.approx(np.max(energies[3]) / initial[3], rel=1e-12)
     assert found[2] < found[3]
+
+
+@pytest.mark.parametrize(
+    ("model", "initial", "verdicts_of"),
+    [
+        # a body without a spring, exact at every step; a cubic spring alone; a spring that pushes away
+        ({"kind": "oscillator", "spring": "0"}, {"u": 1.0, "v": 0.3}, ("PASS", "PASS")),
+        ({"kind": "duffing", "alpha": 0.0}, {"u": 1.0}, ("FAIL", "FAIL")),
+        ({"kind": "oscillator", "spring": "-0.1*u"}, {"u": 0.2, "v": 0.3}, ("FAIL", "PASS")),
+    ],
+)
+def test_round_off_is_known_without_small_oscillations(
+    model: dict[str, object], initial: dict[str, float], verdicts_of: tuple[str, str]
+) -> None:
+    """Their frequency is not defined; an error of 0 once failed as no round-off."""
+    made = Experiment.from_dict(
+        {
+            "title": "t",
+            "model": model,
+            "initial": initial,
+            "time": {"end": 10.0, "base_steps": 8},
+            "levels": [3, 4, 5, 6],
+            "schemes": ["rk4"],
+            "checks": [
+                {"equal": ["rk4", "exact"], "quantity": "u"},
+                {"conserves": "energy", "drift": "none"},
+            ],
+        }
+    )
+    found = verdicts(made, analyse(made, [simulate(made, level) for level in made.levels]))
+    assert tuple(row.status for row in found) == verdicts_of

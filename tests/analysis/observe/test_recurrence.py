@@ -5,12 +5,15 @@ import pytest
 from spring_runs import spring
 from thinned import thinned
 
-from vibsim import theory
+from vibsim import Experiment, analyse, simulate, theory, verdicts
 from vibsim.engine import integrate
 from vibsim.models import MODELS
+from vibsim.observe import oscillation
+from vibsim.observe.member_block import block_of
 from vibsim.observe.oscillation import fit_recurrence
 from vibsim.observe.thresholds import LEAST_STEPS
 from vibsim.schemes import FIXED_STEP
+from vibsim.simulation import simulate_record
 
 SPRING = MODELS["spring"]
 
@@ -101,3 +104,36 @@ def test_measured_growth_and_frequency_are_those_of_theory(kind, w):
     growth, frequency = (float(record[f"measured_{q}"][0, 0, 0]) for q in ("growth", "frequency"))
     assert growth == pytest.approx(float(np.exp(found.log_growth * 2 * np.pi / p)), rel=1e-10)
     assert frequency == pytest.approx(w * float(found.angle) / p, rel=1e-10)
+
+
+@pytest.mark.parametrize(
+    "scheme", ["central", "rk4", "ab3", "bdf2", "euler_cromer", "newmark", "gauss4"]
+)
+def test_a_constant_force_moves_the_place_of_rest_alone(scheme: str) -> None:
+    """Steps, growth and frequency are those about 0; without this no step was that of the scheme."""
+    found = []
+    for rest in (0.0, 0.75):
+        made = Experiment.from_dict(
+            {
+                "title": "t",
+                "model": {
+                    "kind": "system",
+                    "coordinates": {"x": {"acceleration": f"-4*x + {4 * rest}"}},
+                },
+                "initial": {"x": rest + 0.5, "vx": 0.3},
+                "time": {"end": 30.0, "base_steps": 240},
+                "levels": [0, 1],
+                "schemes": [scheme],
+                "checks": [
+                    {"equal": [scheme, "discrete"], "quantity": name} for name in ("x", "vx")
+                ],
+            }
+        )
+        levels = {level: simulate_record(made, level) for level in made.levels}
+        block = block_of(made, levels)
+        found.append(
+            [f(block, 1)[0, 0] for f in (oscillation.growth_per_period, oscillation.frequency)]
+        )
+        judged = verdicts(made, analyse(made, [simulate(made, level) for level in made.levels]))
+        assert [row.status for row in judged] == ["PASS", "PASS"]
+    assert found[1] == pytest.approx(found[0], rel=1e-10)

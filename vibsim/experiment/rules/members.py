@@ -32,7 +32,7 @@ from vibsim.formula import (
     values_of,
 )
 from vibsim.models import FormulaField, Model, tree
-from vibsim.models.base import rate
+from vibsim.models.base import by_name, rate
 from vibsim.models.shared.crossings import STOP
 from vibsim.models.shared.inertia import MASS, inertia
 from vibsim.models.table import Lookup
@@ -125,8 +125,7 @@ class MemberNumbers:
         return {key: swept.get(f"model.{key}", x) for key, x in self.parameters.items()}
 
     def _by_name(self, swept: Mapping[str, Any]) -> dict[str, Any]:
-        parameters = self._parameters(swept)
-        return {row.name: parameters[row.key] for row in self.model.parameters}
+        return by_name(self.model.parameters, self._parameters(swept))
 
 
 def _chunks(count: int) -> Iterator[tuple[int, int]]:

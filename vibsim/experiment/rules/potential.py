@@ -10,6 +10,7 @@ from vibsim.core.array_types import Floats
 from vibsim.experiment.faults import Report
 from vibsim.formula import ZERO, Expression, derivative, has_rule, parse, values, values_of
 from vibsim.models import Model, tree
+from vibsim.models.base import by_name
 from vibsim.models.shared.written_system import AGREE, TESTS
 
 AMPLITUDES = (-6, 8)
@@ -27,7 +28,7 @@ def check_potential(
     `texts` holds the formulas of the file by field.
     """
     names = (model.position, *(row.name for row in model.parameters))
-    numbers = {row.name: parameters[row.key] for row in model.parameters}
+    numbers = by_name(model.parameters, parameters)
     spring = parse(texts.get("spring", model.position), names)
     potential = tree(model, model.potential_energy)
     is_given = "potential" in texts

@@ -13,7 +13,7 @@ import numpy as np
 
 from vibsim.core.array_types import Floats
 from vibsim.formula import ZERO, derivative, put, values
-from vibsim.models.base import Model, Numbers, tree
+from vibsim.models.base import Model, Numbers, by_name, tree
 
 
 @dataclass(frozen=True)
@@ -28,6 +28,8 @@ class FreeOscillation:
     """Initial position relative to the equilibrium r."""
     velocity: Floats
     """Initial velocity over w."""
+    equilibrium: Floats
+    """The place of rest r."""
 
 
 @cache
@@ -56,7 +58,7 @@ def free_oscillation(model: Model, initial: Numbers, parameters: Numbers) -> Fre
     initial, parameters
         Numbers or arrays of shape (case,), by the names of the states and by `vibsim.models.base.Parameter.key`.
     """
-    named = {row.name: np.asarray(parameters[row.key], float) for row in model.parameters}
+    named = by_name(model.parameters, parameters)
     force = tree(model, model.acceleration)
     at_rest = put(put(force, model.position, ZERO), model.velocity, ZERO)
     stiffness = -values(derivative(force, model.position), named)
@@ -64,5 +66,6 @@ def free_oscillation(model: Model, initial: Numbers, parameters: Numbers) -> Fre
     with np.errstate(all="ignore"):
         w = np.sqrt(np.where(stiffness > 0.0, stiffness, np.nan))
         equilibrium = values(at_rest, named) / stiffness
-    numbers = w, rate / w, initial[model.position] - equilibrium, initial[model.velocity] / w
+    start = initial[model.position] - equilibrium, initial[model.velocity] / w
+    numbers = w, rate / w, *start, equilibrium
     return FreeOscillation(*np.broadcast_arrays(*(np.atleast_1d(x) for x in numbers)))

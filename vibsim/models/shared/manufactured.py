@@ -14,7 +14,7 @@ import numpy as np
 
 from vibsim.core.array_types import Floats
 from vibsim.formula import Expression, derivative, replacing, values
-from vibsim.models.base import Numbers, Parameter
+from vibsim.models.base import Numbers, Parameter, by_name
 
 
 @dataclass(frozen=True)
@@ -51,8 +51,7 @@ class Manufactured:
 
     def exact(self, t: Floats, initial: Numbers, parameters: Numbers) -> dict[str, Floats]:
         """Return the states at times `t`, independent of the initial values: see `Model.exact`."""
-        named = {row.name: parameters[row.key] for row in self.parameters}
-        numbers = {**named, "t": t}
+        numbers = {**by_name(self.parameters, parameters), "t": t}
         shape = np.broadcast_shapes(*(np.shape(value) for value in numbers.values()))
         motion = zip(self.names, (*self.positions, *self.velocities), strict=True)
         return {name: np.broadcast_to(values(row, numbers), shape) for name, row in motion}

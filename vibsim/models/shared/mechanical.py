@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cached_property, partial
 from typing import Any, Literal
 
 import numpy as np
@@ -30,7 +30,7 @@ from vibsim.formula import (
     is_zero,
     values,
 )
-from vibsim.models.base import Damping, Formula, Model, Numbers, Parameter, State
+from vibsim.models.base import Damping, Formula, Model, Numbers, Parameter, State, by_name
 from vibsim.models.shared.linear_motion import (
     exponentials,
     forced_motion,
@@ -121,10 +121,7 @@ def mechanical(
     velocity = Name(forces.velocity)
     base = scales(forces)
     is_free = not forces.is_driven and not forces.is_damped
-    keys = {row.name: row.key for row in parameters}
-
-    def numbers(parameters: Numbers) -> dict[str, Any]:
-        return {name: parameters[key] for name, key in keys.items()}
+    numbers = partial(by_name, parameters)
 
     def natural_frequency(parameters: Numbers) -> Any:
         """Return ``sqrt(s'(0)/m)`` [rad s-1]; NaN if s'(0) is not positive and finite."""

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from vibsim.formula import Expression, Name, parse, replacing, to_formula, values
-from vibsim.models.base import Formula, Model, Numbers, parameter_names
+from vibsim.models.base import Formula, Model, Numbers, by_name, parameter_names
 
 T_C, X_C = Name("@t"), Name("@x")
 """The scales of time and position in expressions; no name of a user contains @."""
@@ -121,7 +121,7 @@ def scaled_parameters(model: Model, parameters: Numbers, initial: Numbers) -> di
 
 def _numbers(model: Model, spec: Scales, parameters: Numbers, initial: Numbers) -> dict[str, Any]:
     """Return values by name for the formulas: parameters, initial values, scales of time and position."""
-    numbers = {row.name: parameters[row.key] for row in model.parameters} | dict(initial)
+    numbers = by_name(model.parameters, parameters) | dict(initial)
     numbers[T_C.name] = _value(model, spec.time, numbers)
     size = _value(model, spec.position, numbers)
     numbers[X_C.name] = np.where(size == 0.0, 1.0, size)

@@ -99,10 +99,13 @@ def poincare(record: Results, shown: list[Member]) -> Picture | None:
     columns = [(0.72 + 2.7 * i, 2.1) for i in range(PANELS_A_ROW)]
     figure, axes = panels.rows_of(len(first), columns, 2.1, 0.45, 0.5)
     states = [Ladder(record, name, first[0]) for name in (model.position, model.velocity)]
+    n, rest = divmod(len(record["t"]) - 1, round(periods))
+    if rest or not n:
+        # samples that are thinned do not show every period
+        return None
     drawn = []
     for ax, member in zip(axes, first, strict=True):
         u, v = (state.with_member(member).finest for state in states)
-        n = (u.size - 1) // round(periods)
         u, v = (values[:-1:n][round(periods) // 2 :] for values in (u, v))
         ax.plot(u, v, linestyle="none", marker=".", markersize=3.0, color=style.look(0)["color"])
         ax.set_title(member.case_words or member.scheme_name)

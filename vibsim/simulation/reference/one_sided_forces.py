@@ -126,11 +126,6 @@ def sides(model: Model, parameters: Mapping[str, Floats]) -> Sides:
     return Sides(model, *_held(model), parameters)
 
 
-def varies_in_time(model: Model) -> bool:
-    """Tell whether the force of a model depends on time, other than by a table."""
-    return any("t" in tree(model, row).names for row in model.forces)
-
-
 def pulses_of_force(
     model: Model, parameters: Mapping[str, Floats], states: Floats, t: Floats, *, smooth: bool
 ) -> Pulses:

@@ -26,17 +26,12 @@ from numpy.typing import NDArray
 from vibsim.core import private_cache
 from vibsim.core.array_types import Flags, Floats, Integers
 from vibsim.formula import to_statements
-from vibsim.models import Model, tree
+from vibsim.models.base import Model, tree, varies_in_time
 from vibsim.plan.code_digest import of_folder
 from vibsim.plan.versions import versions
 from vibsim.simulation.members import Members
 from vibsim.simulation.reference.collocation import Pieces, Solved, of_members, solve
-from vibsim.simulation.reference.one_sided_forces import (
-    Sides,
-    pulses_of_force,
-    sides,
-    varies_in_time,
-)
+from vibsim.simulation.reference.one_sided_forces import Sides, pulses_of_force, sides
 from vibsim.simulation.reference.piecewise_collocation import ENDLESS, SLIDING, walk_pieces
 
 METHOD = "collocation at 12 Gauss points of a step, halved until two solutions agree"
