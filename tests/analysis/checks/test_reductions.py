@@ -13,6 +13,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from whole import analysed
 
 from vibsim import analyse, simulate, verdicts
 from vibsim.analysis import summarise
@@ -59,7 +60,7 @@ def resonance(*checks: dict[str, Any], **changes: Any) -> Experiment:
 
 def judged(*checks: dict[str, Any], **changes: Any) -> list[Verdict]:
     found = resonance(*checks, **changes)
-    convergence = analyse(found, {level: simulate(found, level) for level in found.levels})
+    convergence = analysed(found)
     return verdicts(found, convergence)
 
 
@@ -145,7 +146,7 @@ def test_a_resonance_curve_has_its_closed_form() -> None:
 def test_numbers_of_one_level_are_taken_as_they_are(last: int) -> None:
     one = {"level": last}
     found = resonance(CURVE | {"take": "mean", "above": 0, "at": one}, levels=[3, 4, last])
-    convergence = analyse(found, {level: simulate(found, level) for level in found.levels})
+    convergence = analysed(found)
     (verdict,) = verdicts(found, convergence)
     facts = verdict.results[0].facts
     own = convergence["check_check_1_value"].values[0]
@@ -318,7 +319,7 @@ def test_it_is_stored_summed_up_and_left_out_of_a_member_alone() -> None:
     assert restore(json.loads(json.dumps(canonical(found)))) == found
     assert found.checks[0].at.level == "best"  # type: ignore[union-attr]
     assert [check.kind for check in found.alone(2).checks] == ["converges"]
-    convergence = analyse(found, {level: simulate(found, level) for level in found.levels})
+    convergence = analysed(found)
     entry, _, way = summarise(found, verdicts(found, convergence), convergence)["checks"]
     assert way["expected"] == "rising"
     (result,) = entry["results"]

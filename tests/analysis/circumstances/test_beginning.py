@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 from thinned import thinned
+from whole import analysed
 
 from vibsim import Experiment, analyse, simulate, verdicts
 from vibsim.analysis import Verdict
@@ -65,7 +66,7 @@ def every_start(model: tuple[dict[str, Any], str, str], kind: Any, *quantities: 
 
 
 def judged(e: Experiment) -> list[Verdict]:
-    return list(verdicts(e, analyse(e, [simulate(e, level) for level in e.levels])))
+    return list(verdicts(e, analysed(e)))
 
 
 TREATED = [

@@ -6,6 +6,7 @@ from typing import Any
 
 import pytest
 from thinned import thinned
+from whole import analysed
 
 from vibsim import Experiment, Verdict, analyse, simulate, verdicts
 
@@ -130,7 +131,7 @@ def test_a_start_nearly_in_balance_hides_the_promise_between_events_too() -> Non
                 "checks": [{"converges": "u", "order": order, "norm": norm} for order in (1, 2)],
             }
         )
-        record = analyse(made, [simulate(made, level) for level in made.levels])
+        record = analysed(made)
         for verdict in verdicts(made, record):
             assert (verdict.status, verdict.reason) == ("INCONCLUSIVE", "pre_asymptotic")
 
@@ -154,6 +155,6 @@ def test_what_a_hidden_promise_leaves_is_no_other_limit(norm: str) -> None:
         "checks": [{"converges": "v", "order": order, "norm": norm} for order in (1, 2)],
     }
     experiment = Experiment.from_dict(content)
-    record = analyse(experiment, [simulate(experiment, level) for level in experiment.levels])
+    record = analysed(experiment)
     for verdict in verdicts(experiment, record):
         assert verdict.reason == "pre_asymptotic"
