@@ -13,9 +13,9 @@ from typing import Any
 
 import numpy as np
 import pytest
-from whole import analysed
+from whole import analysed, decided
 
-from vibsim import analyse, simulate, verdicts
+from vibsim import verdicts
 from vibsim.analysis import summarise
 from vibsim.analysis.check_verdicts import Verdict
 from vibsim.checks.reductions import REDUCTIONS
@@ -209,8 +209,7 @@ def test_a_number_that_stays_does_not_turn() -> None:
         ],
     }
     experiment = Experiment.from_dict(content)
-    levels = [simulate(experiment, level) for level in experiment.levels]
-    (verdict,) = verdicts(experiment, analyse(experiment, levels))
+    (verdict,) = decided(experiment)
     assert "; it is the same beside model.restitution = 0.6; asked is that it falls" in verdict.text
 
 

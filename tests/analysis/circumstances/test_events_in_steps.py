@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 import yaml
 from thinned import thinned
-from whole import analysed, simulated
+from whole import analysed, decided, simulated
 
 from vibsim import Experiment, analyse, simulate, verdicts
 from vibsim.analysis import analyse_records
@@ -101,8 +101,7 @@ def test_finer_levels_are_not_advised_where_they_count_the_same_bounces(
 @pytest.mark.slow
 def test_the_verdict_says_what_to_change() -> None:
     made = experiment(initial={"u": 1.0, "v": 0.3})
-    record = analysed(made)
-    verdict = verdicts(made, record)[0]
+    verdict = decided(made)[0]
     assert (verdict.status, verdict.reason) == ("INCONCLUSIVE", "non_smooth")
     assert "notices events only at grid points" in verdict.text
     assert verdict.advice == "Set `events: located` for scheme mesh."
@@ -118,8 +117,7 @@ def test_members_whose_exact_solution_is_unknown_stand_beside_those_with_one() -
         checks=checks,
         levels={"from": 7, "to": 11},
     )
-    record = analysed(made)
-    assert [v.status for v in verdicts(made, record)] == ["PASS", "PASS"]
+    assert [v.status for v in decided(made)] == ["PASS", "PASS"]
 
 
 def test_a_ball_without_a_frequency_is_judged() -> None:
@@ -130,8 +128,7 @@ def test_a_ball_without_a_frequency_is_judged() -> None:
         {"value": "rest_time", "at": {"scheme": "rk4"}, "below": 1e9},
     ]
     made = experiment(model=model, initial={"h": 1.0}, schemes=["rk4"], checks=checks)
-    record = analysed(made)
-    found = [(v.status, v.reason) for v in verdicts(made, record)]
+    found = [(v.status, v.reason) for v in decided(made)]
     # parabolas are exact, and the ball moves by its whole height: an error would have been seen
     assert found == [("PASS", "exact"), ("PASS", "match"), ("PASS", "match")]
 
@@ -161,7 +158,7 @@ def test_a_motion_without_a_frequency_is_told_without_one() -> None:
             "checks": [{"stable": True}],
         }
     )
-    (verdict,) = verdicts(experiment, analyse(experiment, [simulate(experiment, 6)]))
+    (verdict,) = decided(experiment)
     assert verdict.status == "PASS"
     assert "nan" not in verdict.text
 
@@ -291,8 +288,7 @@ def test_a_body_that_does_not_rest_is_said_to_move_at_the_end() -> None:
     """More samples were advised."""
     checks = [{"value": name, "below": 9.0} for name in ("rest_time", "last_event_time")]
     made = beads(["rk4"], checks)
-    record = analysed(made)
-    rest, last = verdicts(made, record)
+    rest, last = decided(made)
     assert (rest.status, rest.reason) == ("INCONCLUSIVE", "not_applicable")
     assert "the body moves at the end" in rest.text
     assert "samples" not in rest.advice
