@@ -13,8 +13,9 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+from whole import analysed
 
-from vibsim import Experiment, analyse, simulate, verdicts
+from vibsim import Experiment, verdicts
 from vibsim.core.vocabulary import NORMS, ORDER_TOLERANCE
 from vibsim.models import Model
 from vibsim.schemes import FIXED_STEP, NumberOption, Option
@@ -335,7 +336,7 @@ def drawn_experiment(rng: Rng) -> Content:
 def contradictions(content: Content) -> tuple[list[Contradiction], dict[tuple[str, str], int]]:
     """Judge an experiment; return the verdicts against promises, and how often each outcome of a promise came out."""
     experiment = Experiment.from_dict(content)
-    record = analyse(experiment, [simulate(experiment, level) for level in experiment.levels])
+    record = analysed(experiment)
     found: list[Contradiction] = []
     counts: dict[tuple[str, str], int] = {}
     for verdict in verdicts(experiment, record):

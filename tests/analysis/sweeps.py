@@ -11,7 +11,6 @@ import numpy as np
 from vibsim import Experiment
 from vibsim.analysis import analyse_parts, join_parts
 from vibsim.core.record import Record, Variable
-from vibsim.simulation import simulate_record
 
 CHECKS: list[dict[str, Any]] = [
     {"converges": "theta"},
@@ -85,11 +84,7 @@ def _cut(variable: Variable, start: int, stop: int) -> Variable:
     return Variable(variable.dims, np.array(variable.values[index]), variable.attrs)
 
 
-def simulated(experiment: Experiment) -> dict[int, Record]:
-    return {level: simulate_record(experiment, level) for level in experiment.levels}
-
-
-def analysed(
+def in_parts(
     experiment: Experiment, records: Mapping[int, Record], size: int, processes: int = 1
 ) -> Record:
     readers = {

@@ -8,8 +8,9 @@ from typing import Any
 
 import pytest
 from thinned import thinned
+from whole import analysed
 
-from vibsim import Experiment, analyse, simulate, verdicts
+from vibsim import Experiment, verdicts
 
 pytestmark = pytest.mark.usefixtures("without_series")
 
@@ -161,7 +162,7 @@ def found(make: Make, scale: tuple[float, float, float]) -> dict[tuple[str, str]
     """Return what is decided of every check and scheme, what is said of it without its numbers, and the orders."""
     content = {"title": "scales", "levels": {"from": 7, "to": 10}, **make(*scale)}
     experiment = Experiment.from_dict(content)
-    record = analyse(experiment, [simulate(experiment, level) for level in experiment.levels])
+    record = analysed(experiment)
     return {
         (verdict.id, one.scheme): (one.status, one.reason, NUMBER.sub("#", verdict.text), one.order)
         for verdict in verdicts(experiment, record)

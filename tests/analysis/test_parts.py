@@ -11,8 +11,9 @@ from functools import cache
 import numpy as np
 import pytest
 from numpy.typing import NDArray
-from sweeps import CHECKS, SWEEPS, analysed, assert_same_bytes, cut, of, simulated
+from sweeps import CHECKS, SWEEPS, assert_same_bytes, cut, in_parts, of
 from thinned import thinned
+from whole import simulated
 
 from vibsim import Experiment, analyse
 from vibsim.analysis import analyse_records, blockwise, keep_for_verdicts, summarise, verdicts
@@ -52,7 +53,7 @@ def test_parts_and_processes_change_no_bit(name: str, storage: str) -> None:
     experiment = SWEEPS[name]
     records, whole = made(name, storage)
     size = {6: 1, 8: 3}.get(experiment.members, 5)
-    assert_same_bytes(analysed(experiment, records, size, 3), whole)
+    assert_same_bytes(in_parts(experiment, records, size, 3), whole)
 
 
 ME = os.getpid()
@@ -69,7 +70,7 @@ def test_a_process_that_is_killed_ends_the_analysis(monkeypatch: pytest.MonkeyPa
     experiment = SWEEPS["grid"]
     monkeypatch.setattr(blockwise, "analyse_records", analyse_or_die)
     with pytest.raises(VibsimError, match="was killed; there may be too little memory"):
-        analysed(experiment, simulated(experiment), 5, 2)
+        in_parts(experiment, simulated(experiment), 5, 2)
 
 
 @pytest.mark.parametrize("name", thinned(SWEEPS, 3))
@@ -293,7 +294,7 @@ def test_without_an_exact_solution_only_errors_are_unknown(
     assert ("theta_exact" in known) == (storage == "series")
     assert np.array_equal(found["theta_difference_norm"], known["theta_difference_norm"])
     assert np.all(found["theta_floor"] <= known["theta_floor"])
-    assert_same_bytes(analysed(experiment, records, 1), found)
+    assert_same_bytes(in_parts(experiment, records, 1), found)
     assert [v.status for v in verdicts(experiment, found)]
 
 

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 from thinned import thinned
+from whole import analysed
 
 from vibsim import Experiment, VibsimError, analyse, simulate, verdicts
 
@@ -34,7 +35,7 @@ def problem(levels: Any, scheme: Any = KICK, end: float = 20.0, **more: Any) -> 
 
 
 def outcome(experiment: Experiment) -> tuple[list[tuple[str, str]], Any]:
-    record = analyse(experiment, [simulate(experiment, level) for level in experiment.levels])
+    record = analysed(experiment)
     return [(v.status, v.reason) for v in verdicts(experiment, record)], record
 
 

@@ -7,7 +7,8 @@ from typing import Any
 import numpy as np
 import pytest
 from numpy.typing import NDArray
-from sweeps import analysed, assert_same_bytes, simulated
+from sweeps import assert_same_bytes, in_parts
+from whole import simulated
 
 from vibsim import Experiment, Verdict, analyse, verdicts
 from vibsim.analysis import analyse_records
@@ -173,7 +174,7 @@ def test_a_sweep_has_the_same_bits_in_parts(lean: bool, monkeypatch: pytest.Monk
     )
     records = simulated(experiment)
     whole = analyse_records(experiment, records)
-    assert_same_bytes(analysed(experiment, records, size=4), whole)
+    assert_same_bytes(in_parts(experiment, records, size=4), whole)
     assert whole.attrs["storage"] == ("lean" if lean else "series")
     assert [verdict.status for verdict in verdicts(experiment, whole)] == ["PASS"] * 3
 

@@ -78,5 +78,5 @@ def test_every_assessment_has_a_verdict(
             assert verdict.order is None
             assert verdict.h_used == ()
         verdict.to_xarray()
-        if i < 2:  # pictures take most of the time
+        if i == 0:  # pictures take most of the time
             assert verdict.plot().axes

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import runpy
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -21,7 +22,11 @@ from vibsim.schemes import SCHEMES
 
 ROOT = Path(__file__).resolve().parents[2]
 main = runpy.run_path(str(ROOT / "workflow" / "schemas.py"))["main"]
-VALIDATOR = Draft202012Validator(schema())
+
+
+@cache
+def validator() -> Draft202012Validator:
+    return Draft202012Validator(schema())
 
 
 def test_kept_schemas_are_current() -> None:
@@ -64,7 +69,7 @@ def test_schema_is_a_schema() -> None:
     ],
 )
 def test_accepts_what_the_loader_accepts(changes: dict[str, Any]) -> None:
-    VALIDATOR.validate(content(**changes))
+    validator().validate(content(**changes))
     build(**changes)
 
 
@@ -79,7 +84,7 @@ def test_accepts_what_the_loader_accepts(changes: dict[str, Any]) -> None:
     ],
 )
 def test_refuses_what_the_loader_refuses(changes: dict[str, Any]) -> None:
-    assert not VALIDATOR.is_valid(content(**changes))
+    assert not validator().is_valid(content(**changes))
     faults_of(**changes)
 
 
@@ -104,7 +109,7 @@ def test_repeats_are_indices_or_one_chain(repeat: dict[str, Any], is_sound: bool
     coordinates = {} if "n" in repeat else {"coordinates": {"x_{i}": {"acceleration": "-x_{i}"}}}
     model = {"kind": "system", **coordinates, "repeat": repeat}
     changes = {"model": model, "initial": {"x_1": 1}, "checks": []}
-    assert VALIDATOR.is_valid(content(**changes)) == is_sound
+    assert validator().is_valid(content(**changes)) == is_sound
     if is_sound:
         build(**changes)
     else:
@@ -112,22 +117,22 @@ def test_repeats_are_indices_or_one_chain(repeat: dict[str, Any], is_sound: bool
 
 
 def test_accepts_the_first_example() -> None:
-    VALIDATOR.validate(parse(EXAMPLE.encode(), "example").data)
+    validator().validate(parse(EXAMPLE.encode(), "example").data)
 
 
 @pytest.mark.parametrize("collection", ["pendulum_lab", "showcase"])
 def test_accepts_every_experiment_that_is_shipped(collection: str) -> None:
     for file in (ROOT / "configs" / collection).glob("*.yaml"):
-        VALIDATOR.validate(parse(file.read_bytes(), file.name).data)
+        validator().validate(parse(file.read_bytes(), file.name).data)
 
 
 def test_knows_the_states_of_models_and_not_those_of_systems() -> None:
     spring = content(model={"kind": "spring"}, initial={"u": 1})
-    assert VALIDATOR.is_valid(spring)
-    assert not VALIDATOR.is_valid(spring | {"initial": {"height": 1}})
+    assert validator().is_valid(spring)
+    assert not validator().is_valid(spring | {"initial": {"height": 1}})
     system = content(model={"kind": "system", "coordinates": ["height"]}, initial={"height": 1})
-    assert VALIDATOR.is_valid(system)
-    assert not VALIDATOR.is_valid(system | {"initial": {"height": [1]}})
+    assert validator().is_valid(system)
+    assert not validator().is_valid(system | {"initial": {"height": [1]}})
 
 
 BY_SHAPE = ("unknown key", "required key", "unknown choice", "must be a mapping", "must be a list")
@@ -137,7 +142,7 @@ def test_refuses_what_has_a_wrong_shape() -> None:
     for changes, _, rule, *_ in CASES:
         needs_model = rule == "required key is missing" and "checks" in changes
         if rule.startswith(BY_SHAPE) and not (needs_model and "value" in changes["checks"][0]):
-            assert not VALIDATOR.is_valid(content(**changes)), changes
+            assert not validator().is_valid(content(**changes)), changes
 
 
 def _properties(node: Any) -> list[tuple[str, dict[str, Any]]]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -17,7 +18,12 @@ from vibsim.experiment.schema.solver import schema
 from vibsim.experiment.solver import SolverExperiment, restore
 from vibsim.experiment.solver_reading import from_file
 
-VALIDATOR = Draft202012Validator(schema())
+
+@cache
+def validator() -> Draft202012Validator:
+    return Draft202012Validator(schema())
+
+
 TEXT = """\
 title: Time stepping of my heat solver
 solver:
@@ -301,14 +307,14 @@ def test_an_experiment_comes_back_from_its_content(heat: Path) -> None:
 
 def test_the_schema_for_editors_accepts_and_refuses_the_same(heat: Path) -> None:
     Draft202012Validator.check_schema(schema())
-    assert VALIDATOR.is_valid(yaml.safe_load(TEXT))
+    assert validator().is_valid(yaml.safe_load(TEXT))
     for old, new in (
         ("inputs: [heat]", "python: 'm:f'"),
         ("order: 2", "tolerance: 2"),
         ("flux: {}", "flux: {restrict: mena}"),
         ("sweep:", "resources: {mem_mb: lots}\nsweep:"),
     ):
-        assert not VALIDATOR.is_valid(yaml.safe_load(TEXT.replace(old, new))), new
+        assert not validator().is_valid(yaml.safe_load(TEXT.replace(old, new))), new
 
 
 def test_an_experiment_of_vibsim_is_not_made_of_it(heat: Path) -> None:

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 import pytest
 from level_records import experiment, level_records, standard_error
-from sweeps import simulated
+from whole import simulated
 
 from vibsim import Experiment
 from vibsim.analysis import analyse_records, verdicts

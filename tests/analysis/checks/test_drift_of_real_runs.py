@@ -6,8 +6,9 @@ from typing import Any
 
 import pytest
 from thinned import thinned
+from whole import decided
 
-from vibsim import Experiment, analyse, simulate, verdicts
+from vibsim import Experiment
 
 DRIFTS = ("none", "bounded", "linear", "quadratic")
 
@@ -24,8 +25,7 @@ def found(scheme: str, level: int, **initial: float) -> dict[str, tuple[str, str
         "checks": [{"conserves": "energy", "drift": drift} for drift in DRIFTS],
     }
     experiment = Experiment.from_dict(data)
-    record = analyse(experiment, [simulate(experiment, level)])
-    told = verdicts(experiment, record)
+    told = decided(experiment)
     return {drift: (one.status, one.reason) for drift, one in zip(DRIFTS, told, strict=True)}
 
 
@@ -86,7 +86,7 @@ def test_the_stairs_of_several_frequencies_are_no_drift() -> None:
         "checks": [{"conserves": "energy", "drift": drift} for drift in DRIFTS],
     }
     experiment = Experiment.from_dict(data)
-    told = verdicts(experiment, analyse(experiment, [simulate(experiment, 11)]))
+    told = decided(experiment)
     for one in told[2:]:
         assert one.status != "PASS"
     assert told[1].reason == "pre_asymptotic"
@@ -113,7 +113,7 @@ def test_an_oscillation_of_two_frequencies_is_no_drift(scheme: str) -> None:
         "checks": [{"conserves": "energy", "drift": drift} for drift in DRIFTS[1:]],
     }
     experiment = Experiment.from_dict(data)
-    told = verdicts(experiment, analyse(experiment, [simulate(experiment, 12)]))
+    told = decided(experiment)
     assert [one.status for one in told[:2]] == ["INCONCLUSIVE", "INCONCLUSIVE"]
 
 
@@ -129,5 +129,5 @@ def test_a_drift_that_has_just_overtaken_an_oscillation_is_linear() -> None:
         "checks": [{"conserves": "energy", "drift": drift} for drift in ("linear", "quadratic")],
     }
     experiment = Experiment.from_dict(data)
-    told = verdicts(experiment, analyse(experiment, [simulate(experiment, 11)]))
+    told = decided(experiment)
     assert [one.status for one in told] == ["PASS", "FAIL"]

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from sweeps import simulated
+from whole import simulated
 
 from vibsim import Experiment, InputError, VibsimError, best, ladder, verdicts
 from vibsim.analysis import analyse_records, keep_for_verdicts, summarise

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import Any
 
 import pytest
-from sweeps import simulated
+from whole import simulated
 
 from vibsim import Experiment, Verdict, verdicts
 from vibsim.analysis import analyse_records

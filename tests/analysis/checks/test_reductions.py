@@ -13,8 +13,9 @@ from typing import Any
 
 import numpy as np
 import pytest
+from whole import analysed, decided
 
-from vibsim import analyse, simulate, verdicts
+from vibsim import verdicts
 from vibsim.analysis import summarise
 from vibsim.analysis.check_verdicts import Verdict
 from vibsim.checks.reductions import REDUCTIONS
@@ -59,7 +60,7 @@ def resonance(*checks: dict[str, Any], **changes: Any) -> Experiment:
 
 def judged(*checks: dict[str, Any], **changes: Any) -> list[Verdict]:
     found = resonance(*checks, **changes)
-    convergence = analyse(found, {level: simulate(found, level) for level in found.levels})
+    convergence = analysed(found)
     return verdicts(found, convergence)
 
 
@@ -145,7 +146,7 @@ def test_a_resonance_curve_has_its_closed_form() -> None:
 def test_numbers_of_one_level_are_taken_as_they_are(last: int) -> None:
     one = {"level": last}
     found = resonance(CURVE | {"take": "mean", "above": 0, "at": one}, levels=[3, 4, last])
-    convergence = analyse(found, {level: simulate(found, level) for level in found.levels})
+    convergence = analysed(found)
     (verdict,) = verdicts(found, convergence)
     facts = verdict.results[0].facts
     own = convergence["check_check_1_value"].values[0]
@@ -208,8 +209,7 @@ def test_a_number_that_stays_does_not_turn() -> None:
         ],
     }
     experiment = Experiment.from_dict(content)
-    levels = [simulate(experiment, level) for level in experiment.levels]
-    (verdict,) = verdicts(experiment, analyse(experiment, levels))
+    (verdict,) = decided(experiment)
     assert "; it is the same beside model.restitution = 0.6; asked is that it falls" in verdict.text
 
 
@@ -318,7 +318,7 @@ def test_it_is_stored_summed_up_and_left_out_of_a_member_alone() -> None:
     assert restore(json.loads(json.dumps(canonical(found)))) == found
     assert found.checks[0].at.level == "best"  # type: ignore[union-attr]
     assert [check.kind for check in found.alone(2).checks] == ["converges"]
-    convergence = analyse(found, {level: simulate(found, level) for level in found.levels})
+    convergence = analysed(found)
     entry, _, way = summarise(found, verdicts(found, convergence), convergence)["checks"]
     assert way["expected"] == "rising"
     (result,) = entry["results"]

@@ -7,8 +7,9 @@ from typing import Any
 
 import numpy as np
 import pytest
+from whole import analysed
 
-from vibsim import analyse, simulate, verdicts
+from vibsim import verdicts
 from vibsim.analysis.check_verdicts import Verdict
 from vibsim.core.errors import InputError
 from vibsim.experiment import Experiment
@@ -34,7 +35,7 @@ def experiment(*checks: dict[str, Any], **changes: Any) -> Experiment:
 
 def judged(*checks: dict[str, Any], **changes: Any) -> list[Verdict]:
     found = experiment(*checks, **changes)
-    convergence = analyse(found, {level: simulate(found, level) for level in found.levels})
+    convergence = analysed(found)
     return verdicts(found, convergence)
 
 

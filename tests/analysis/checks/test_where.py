@@ -7,7 +7,8 @@ from typing import Any
 
 import numpy as np
 import pytest
-from sweeps import SWEEPS, of, simulated
+from sweeps import SWEEPS, of
+from whole import simulated
 
 from vibsim.analysis import analyse_records, summarise, verdicts
 from vibsim.checks.outcome import Outcome, Results

@@ -7,8 +7,9 @@ from typing import Any
 import numpy as np
 import pytest
 from thinned import thinned
+from whole import decided
 
-from vibsim import Experiment, analyse, simulate, verdicts
+from vibsim import Experiment, analyse, simulate
 from vibsim.analysis import Verdict
 from vibsim.apriori.formal_orders import BEGINNINGS, beginnings, formal_orders
 from vibsim.experiment import sweep_columns
@@ -65,7 +66,7 @@ def every_start(model: tuple[dict[str, Any], str, str], kind: Any, *quantities: 
 
 
 def judged(e: Experiment) -> list[Verdict]:
-    return list(verdicts(e, analyse(e, [simulate(e, level) for level in e.levels])))
+    return list(decided(e))
 
 
 TREATED = [

@@ -7,8 +7,8 @@ from typing import Any
 
 import numpy as np
 import pytest
-from sweeps import simulated
 from thinned import thinned
+from whole import analysed, simulated
 
 from vibsim import Experiment, Verdict, analyse, simulate, verdicts
 from vibsim.analysis import analyse_records
@@ -91,7 +91,7 @@ def test_levels_that_are_too_coarse_for_the_order_of_the_corner_are_asked_for() 
 
 def test_before_the_first_turn_the_order_is_that_of_the_scheme() -> None:
     made = experiment(["rk4"], time={"end": 3.0}, levels=[5, 6, 7, 8])
-    record = analyse(made, [simulate(made, level) for level in made.levels])
+    record = analysed(made)
     assert np.isnan(record["corner_time"]).all()
     assert [(v.status, v.reason) for v in verdicts(made, record)] == [("PASS", "asymptotic")]
 
@@ -128,7 +128,7 @@ def corner(model: dict[str, Any], **changes: Any) -> tuple[float, float, str]:
         ["velocity_verlet" if "damping" not in model else "rk4"], model={"kind": "oscillator", **model},
         checks=[], levels=[7, 10], **changes,
     )  # fmt: skip
-    record = analyse(made, [simulate(made, level) for level in made.levels])
+    record = analysed(made)
     index = int(record["corner_switch"][0, 0])
     words = words_of(made.model.definition, index) if index >= 0 else ""
     return float(record["corner_time"][0, 0]), float(record["corner_power"][0, 0]), words
@@ -192,13 +192,13 @@ def test_a_contact_leaves_a_broken_power_by_every_scheme(scheme: str) -> None:
 def test_a_smooth_force_has_no_corners() -> None:
     made = experiment(["rk4"], model={"kind": "oscillator", "spring": "sin(u)"}, levels=[4, 5])
     assert not switches_of(made.model.definition)
-    assert "corner_time" not in analyse(made, [simulate(made, level) for level in made.levels])
+    assert "corner_time" not in analysed(made)
 
 
 def test_members_of_a_sweep_have_their_own_corner() -> None:
     sweep = {"initial.v": [-0.5, 0.0, 0.5, -2.0]}
     made = experiment(["rk4"], sweep=sweep, checks=[], levels=[7, 9], time={"end": 2.5})
-    record = analyse(made, [simulate(made, level) for level in made.levels])
+    record = analysed(made)
     times = record["corner_time"].values[0]
     assert np.isnan(times).tolist() == [True, True, False, False]
     assert 0.3 < times[2] < 0.5
@@ -213,7 +213,7 @@ def test_a_velocity_that_an_event_turns_has_passed_no_corner() -> None:
     ball = {**QUADRATIC, "spring": "g", "parameters": {"g": 9.81}, "events": [event]}
     # it falls from rest, bounces at 0.75 and turns at the top at 1.07
     made = experiment(["rk4"], model=ball, initial={"u": 2.0}, time={"end": 1.2})
-    convergence = analyse(made, [simulate(made, level) for level in made.levels])
+    convergence = analysed(made)
     bounce, turn = convergence.event_time.values[0, 0, -1, 0], convergence.corner_time.item()
     assert bounce == pytest.approx(0.7532, abs=0.01)
     assert turn > bounce + 0.1
@@ -389,7 +389,7 @@ def test_the_roughest_corner_counts_not_the_first() -> None:
     """Quadratic damping has a corner at each turn from t = 3.2 on, which leaves order 3; the force jumps at t = 7.3."""
     model = {**QUADRATIC, "force": "heaviside(t - 7.3)"}
     made = experiment(["heun", "rk4"], model=model, levels=[7, 8, 9, 10])
-    record = analyse(made, [simulate(made, level) for level in made.levels])
+    record = analysed(made)
     assert np.asarray(record["corner_power"]).ravel().tolist() == [1.0, 1.0]
     assert np.asarray(record["corner_time"]).ravel() == pytest.approx([7.3, 7.3])
     for verdict in verdicts(made, record):
@@ -401,7 +401,7 @@ def test_the_roughest_corner_counts_not_the_first() -> None:
 def test_corners_of_the_load_of_a_structure_are_known(load: str, power: float) -> None:
     model = {"kind": "structure", "stiffness": [[2, -1], [-1, 2]], "load": {2: load}}
     made = experiment(["newmark"], model=model, initial={}, checks=[{"converges": "u1"}])
-    record = analyse(made, [simulate(made, level) for level in made.levels])
+    record = analysed(made)
     assert np.asarray(record["corner_power"]).item() == power
     assert np.asarray(record["corner_time"]).item() == pytest.approx(1.7)
 

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from sweeps import simulated
+from whole import analysed, simulated
 
 from vibsim import Experiment, analyse, simulate, verdicts
 from vibsim.analysis import analyse_records
@@ -96,7 +96,7 @@ def test_a_wrong_solution_with_a_decay_that_levels_see_stays_one() -> None:
 def test_the_rate_is_that_along_the_motion() -> None:
     """Quadratic damping b abs(v) v takes a velocity away at the rate 2 b abs(v), most at the start."""
     made = experiment({"damping": {"quadratic": 3.0}}, {"v": 2.0})
-    record = analyse(made, [simulate(made, level) for level in made.levels])
+    record = analysed(made)
     np.testing.assert_allclose(record["decay_rate"], 12.0, rtol=1e-12)
     made = experiment({}, {"v": 2.0})
-    assert "decay_rate" not in analyse(made, [simulate(made, level) for level in made.levels])
+    assert "decay_rate" not in analysed(made)

@@ -11,8 +11,8 @@ from typing import Any
 import numpy as np
 import pytest
 import yaml
-from sweeps import simulated
 from thinned import thinned
+from whole import analysed, decided, simulated
 
 from vibsim import Experiment, analyse, simulate, verdicts
 from vibsim.analysis import analyse_records
@@ -48,7 +48,7 @@ def reasons(scheme: str) -> dict[Any, Counter[str]]:
     made = experiment(
         schemes=[SCHEMES[scheme]], sweep={"sample": {**sample, "over": over}}, samples="common"
     )
-    record = analyse(made, [simulate(made, level) for level in made.levels])
+    record = analysed(made)
     return {
         order: Counter(
             REASON_NAMES[int(i)] for i in np.asarray(record[f"check_check_{k + 1}_reason"])[0]
@@ -101,8 +101,7 @@ def test_finer_levels_are_not_advised_where_they_count_the_same_bounces(
 @pytest.mark.slow
 def test_the_verdict_says_what_to_change() -> None:
     made = experiment(initial={"u": 1.0, "v": 0.3})
-    record = analyse(made, [simulate(made, level) for level in made.levels])
-    verdict = verdicts(made, record)[0]
+    verdict = decided(made)[0]
     assert (verdict.status, verdict.reason) == ("INCONCLUSIVE", "non_smooth")
     assert "notices events only at grid points" in verdict.text
     assert verdict.advice == "Set `events: located` for scheme mesh."
@@ -118,8 +117,7 @@ def test_members_whose_exact_solution_is_unknown_stand_beside_those_with_one() -
         checks=checks,
         levels={"from": 7, "to": 11},
     )
-    record = analyse(made, [simulate(made, level) for level in made.levels])
-    assert [v.status for v in verdicts(made, record)] == ["PASS", "PASS"]
+    assert [v.status for v in decided(made)] == ["PASS", "PASS"]
 
 
 def test_a_ball_without_a_frequency_is_judged() -> None:
@@ -130,8 +128,7 @@ def test_a_ball_without_a_frequency_is_judged() -> None:
         {"value": "rest_time", "at": {"scheme": "rk4"}, "below": 1e9},
     ]
     made = experiment(model=model, initial={"h": 1.0}, schemes=["rk4"], checks=checks)
-    record = analyse(made, [simulate(made, level) for level in made.levels])
-    found = [(v.status, v.reason) for v in verdicts(made, record)]
+    found = [(v.status, v.reason) for v in decided(made)]
     # parabolas are exact, and the ball moves by its whole height: an error would have been seen
     assert found == [("PASS", "exact"), ("PASS", "match"), ("PASS", "match")]
 
@@ -143,7 +140,7 @@ def test_the_treatment_of_events_can_be_swept_on_a_scheme_without_other_words() 
     made = experiment(
         model=ball, initial={"h": 1.0}, schemes=["rk4"], sweep=sweep, checks=checks, levels=[5, 6]
     )
-    record = analyse(made, [simulate(made, level) for level in made.levels])
+    record = analysed(made)
     assert record["schemes_rk4_events"].values.tolist() == ["located"] * 2 + ["mesh"] * 2
     (verdict,) = verdicts(made, record)
     assert verdict.status == "PASS"
@@ -161,7 +158,7 @@ def test_a_motion_without_a_frequency_is_told_without_one() -> None:
             "checks": [{"stable": True}],
         }
     )
-    (verdict,) = verdicts(experiment, analyse(experiment, [simulate(experiment, 6)]))
+    (verdict,) = decided(experiment)
     assert verdict.status == "PASS"
     assert "nan" not in verdict.text
 
@@ -176,7 +173,7 @@ def test_what_meets_no_event_has_the_order_of_a_smooth_motion(events: str) -> No
     swept = experiment(
         schemes=[scheme], initial=initial, sweep={"time.end": ends}, time={"end": 1.0}
     )
-    record = analyse(swept, [simulate(swept, level) for level in swept.levels])
+    record = analysed(swept)
     assert record["u_formal_order"].values.tolist() == [[2.0, 1.0]]
     found = verdicts(swept, record)
     asked = {order: verdict.results for order, verdict in zip(ORDERS, found, strict=True)}
@@ -270,7 +267,7 @@ def test_the_time_of_an_event_has_an_error_from_the_levels() -> None:
         {"value": "event_time", "at": {"event": 2, "level": 9}, "equals": impact(2), "atol": 1e-8},
     ]
     made = beads(["rk4"], checks)
-    record = analyse(made, [simulate(made, level) for level in made.levels])
+    record = analysed(made)
     found = verdicts(made, record)
     assert [(v.status, v.reason) for v in found] == [
         ("PASS", "match"),
@@ -291,8 +288,7 @@ def test_a_body_that_does_not_rest_is_said_to_move_at_the_end() -> None:
     """More samples were advised."""
     checks = [{"value": name, "below": 9.0} for name in ("rest_time", "last_event_time")]
     made = beads(["rk4"], checks)
-    record = analyse(made, [simulate(made, level) for level in made.levels])
-    rest, last = verdicts(made, record)
+    rest, last = decided(made)
     assert (rest.status, rest.reason) == ("INCONCLUSIVE", "not_applicable")
     assert "the body moves at the end" in rest.text
     assert "samples" not in rest.advice
@@ -346,7 +342,7 @@ def test_an_event_that_the_mesh_moves_across_the_end_asks_for_located_events() -
 @pytest.mark.parametrize("kind", thinned(["central", "heun", "gauss4", "ab3", "forward_euler"], 3))
 def test_the_bounds_of_the_times_of_events_hold(kind: str) -> None:
     made = beads([kind], [time_of(k, above=0.0) for k in (1, 2, 3)])
-    record = analyse(made, [simulate(made, level) for level in made.levels])
+    record = analysed(made)
     for k in (1, 2, 3):
         value, bound = (
             float(record[f"check_check_{k}_{w}"][0, 0]) for w in ("value", "error_bound")

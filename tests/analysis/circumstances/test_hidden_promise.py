@@ -6,8 +6,9 @@ from typing import Any
 
 import pytest
 from thinned import thinned
+from whole import analysed, decided
 
-from vibsim import Experiment, Verdict, analyse, simulate, verdicts
+from vibsim import Experiment, Verdict, verdicts
 
 pytestmark = pytest.mark.usefixtures("without_series")
 
@@ -34,8 +35,7 @@ def judged(
             "checks": [{"converges": quantity, "order": order} for order in orders],
         }
     )
-    record = analyse(experiment, [simulate(experiment, level) for level in levels])
-    return verdicts(experiment, record)
+    return decided(experiment)
 
 
 WEAK = {"kind": "oscillator", "spring": "u", "damping": {"linear": 1e-4}}
@@ -130,7 +130,7 @@ def test_a_start_nearly_in_balance_hides_the_promise_between_events_too() -> Non
                 "checks": [{"converges": "u", "order": order, "norm": norm} for order in (1, 2)],
             }
         )
-        record = analyse(made, [simulate(made, level) for level in made.levels])
+        record = analysed(made)
         for verdict in verdicts(made, record):
             assert (verdict.status, verdict.reason) == ("INCONCLUSIVE", "pre_asymptotic")
 
@@ -154,6 +154,5 @@ def test_what_a_hidden_promise_leaves_is_no_other_limit(norm: str) -> None:
         "checks": [{"converges": "v", "order": order, "norm": norm} for order in (1, 2)],
     }
     experiment = Experiment.from_dict(content)
-    record = analyse(experiment, [simulate(experiment, level) for level in experiment.levels])
-    for verdict in verdicts(experiment, record):
+    for verdict in decided(experiment):
         assert verdict.reason == "pre_asymptotic"

@@ -6,8 +6,9 @@ import math
 from typing import Any
 
 import pytest
+from whole import decided
 
-from vibsim import Experiment, Verdict, analyse, simulate, verdicts
+from vibsim import Experiment, Verdict
 
 pytestmark = pytest.mark.usefixtures("without_series")
 
@@ -28,8 +29,7 @@ def judged(
             "checks": checks,
         }
     )
-    record = analyse(experiment, [simulate(experiment, level) for level in levels])
-    return verdicts(experiment, record)
+    return decided(experiment)
 
 
 def oscillator(spring: str, potential: str | None = None) -> dict[str, Any]:
@@ -127,5 +127,4 @@ def test_a_step_beyond_the_limit_is_unstable(
             "checks": checks,
         }
     )
-    record = analyse(experiment, [simulate(experiment, level) for level in levels])
-    assert {one.reason for one in verdicts(experiment, record)} == {"unstable"}
+    assert {one.reason for one in decided(experiment)} == {"unstable"}

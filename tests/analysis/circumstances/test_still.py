@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 import pytest
-from sweeps import simulated
+from whole import simulated
 
 from vibsim import Experiment, verdicts
 from vibsim.analysis import analyse_records

@@ -7,9 +7,9 @@ from typing import Any
 
 import numpy as np
 import pytest
-from sweeps import simulated
+from whole import analysed, simulated
 
-from vibsim import Experiment, Verdict, analyse, simulate, verdicts
+from vibsim import Experiment, Verdict, simulate, verdicts
 from vibsim.analysis import analyse_records
 from vibsim.apriori.formal_orders import left_to_the_mesh
 from vibsim.apriori.table_corners import table_corners
@@ -55,7 +55,7 @@ def test_steps_that_end_at_the_points_have_the_order_of_the_scheme(folder: Path)
     names = ("u", "v", "energy", "absolute_position", "work_done")
     checks = [{"converges": name, "order": "scheme"} for name in names]
     made = experiment(100, ["central", "rk4"], checks)
-    record = analyse(made, [simulate(made, level) for level in made.levels])
+    record = analysed(made)
     found = [(v.status, v.reason) for v in verdicts(made, record)]
     assert found == [("PASS", "asymptotic")] * len(names)
     formal = {name: record[f"{name}_formal_order"].values.tolist() for name in names}
@@ -164,7 +164,7 @@ ZIGZAG = [(0.0, 0.0), *((t, (-1.0) ** i * t) for i, t in enumerate((0.93, 2.2, 2
 @pytest.mark.parametrize("points", [RAMP, [*ZIGZAG, (11.0, 0.0)]])
 def test_points_of_a_load_within_steps_are_told_and_bounded(folder: Path, points: Any) -> None:
     made = loaded(points, folder)
-    record = analyse(made, [simulate(made, level) for level in made.levels])
+    record = analysed(made)
     found = list(verdicts(made, record))
     assert {(v.status, v.reason) for v in found} == {("INCONCLUSIVE", "non_smooth")}
     assert f"At t = {points[1][0]:.4g} it is not" in found[0].advice
@@ -177,7 +177,7 @@ def test_points_of_a_load_within_steps_are_told_and_bounded(folder: Path, points
 
 def test_no_point_of_a_load_is_within_a_step_that_ends_there(folder: Path) -> None:
     made = loaded([(0.0, 0.0), (2.5, 3.0), (11.0, 0.0)], folder)
-    record = analyse(made, [simulate(made, level) for level in made.levels])
+    record = analysed(made)
     assert np.isnan(record["table_corner_time"].values).all()
     found = [(v.status, v.reason) for v in verdicts(made, record)]
     assert found == [("PASS", "asymptotic")] * 2
@@ -189,7 +189,7 @@ STRAIGHT = [(0.0, 0.0), (0.7, 0.07), (1.1, 0.11), (2.5, 0.25), (11.0, 9.0)]
 @pytest.mark.parametrize("points", [STRAIGHT, [(0.0, 0.0), (11.0, 1.0)]])
 def test_a_point_on_a_straight_line_is_no_corner(folder: Path, points: Any) -> None:
     made = loaded(points, folder)
-    record = analyse(made, [simulate(made, level) for level in made.levels])
+    record = analysed(made)
     assert np.isnan(record["table_corner_time"].values).all()
 
 
@@ -197,7 +197,7 @@ def test_members_have_corners_of_their_own(folder: Path) -> None:
     """With 32 steps to t = 8 the point at 2.5 is a grid point, with as many to t = 9 it is none."""
     points = [(0.0, 0.0), (2.5, 3.0), (11.0, 0.0)]
     made = loaded(points, folder, sweep={"time.end": [8.0, 9.0]})
-    record = analyse(made, [simulate(made, level) for level in made.levels])
+    record = analysed(made)
     times = record["table_corner_time"].values
     assert np.isnan(times[0])
     assert times[1] == 2.5
