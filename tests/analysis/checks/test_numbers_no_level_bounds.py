@@ -140,6 +140,27 @@ def test_levels_that_differ_in_their_events_long_before_the_end_are_named() -> N
     assert "end of the run" not in found.text
 
 
+@pytest.mark.usefixtures("with_series")
+def test_a_count_on_which_the_finest_levels_differ_is_not_settled() -> None:
+    """The highest crest is just above a stop, and the finest level alone meets it, long before the end."""
+    content = {
+        "model": {**DRIVEN["model"], "force": "cos(t)"},
+        "events": [{"when": "u - 3.2498152132695193", "rising": True, "then": {"v": "-0.8*v"}}],
+        "initial": {"u": 0.0},
+        "time": {"end": 12.2, "base_steps": 32},
+        "levels": [0, 1, 2, 3],
+        "schemes": ["rk4"],
+    }
+    count = {"value": "event_count", "equals": 1}
+    of_level = {**count, "at": {"level": 3}}
+    found, known = run(content, count, of_level).verdicts
+    assert (found.status, found.reason) == ("INCONCLUSIVE", "pre_asymptotic")
+    assert "number of events: 0 on level 1, 0 on level 2 and 1 on level 3" in found.text
+    assert "Add levels 4" in found.advice
+    # the number of one level is a fact
+    assert known.status == "PASS"
+
+
 @pytest.mark.parametrize(
     ("end", "event", "count"),
     [
