@@ -250,6 +250,6 @@ def room(check: ValueCheck, value: Any) -> Any:
 
 def distance_to_the_cut(check: ValueCheck, value: Any) -> Any:
     """Return the distance of angles from -pi and pi, where they wrap around; infinite if that does not matter."""
-    key, wanted = border(check)
-    is_cut = check.number.is_angle and key != "equals" and abs(wanted) < np.pi
+    key, _ = border(check)
+    is_cut = check.number.is_angle and key != "equals"
     return np.pi - np.abs(value) if is_cut else math.inf

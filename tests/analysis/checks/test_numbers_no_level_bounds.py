@@ -339,12 +339,6 @@ def test_an_angle_whose_bound_goes_through_pi_is_neither_below_nor_above() -> No
     assert "goes through" not in around.text
 
 
-def test_an_angle_is_within_all_angles_wherever_its_bound_goes() -> None:
-    asked = ({"above": -4.0}, {"below": 4.0}, {"below": -4.0})
-    found = run(NEAR_PI, *({**PHASE, **one} for one in asked)).verdicts
-    assert [one.status for one in found] == ["PASS", "PASS", "FAIL"]
-
-
 def test_the_largest_of_angles_is_open_where_one_goes_through_pi() -> None:
     over = {"over": "model.parameters.w", "take": "smallest"}
     content = {**NEAR_PI, "sweep": {"model.parameters.w": [2.2, 2.4]}}
@@ -416,8 +410,8 @@ def test_levels_that_store_fewer_samples_leave_a_bound_of_a_steady_motion() -> N
         "sweep": {"model.parameters.w": {"linspace": [0.5, 3.0, 60]}},
     }
     checks = [
-        {"id": name, "value": f"steady_{name}", "quantity": "u", "below": 1e9, **BEST}
-        for name in ("amplitude", "phase")
+        {"id": name, "value": f"steady_{name}", "quantity": "u", "below": most, **BEST}
+        for name, most in (("amplitude", 1e9), ("phase", 3.0))
     ]
     record = run(content, *checks).record
     w = np.asarray(record["model_parameters_w"])
