@@ -256,3 +256,15 @@ def test_the_last_time_counts_where_its_velocity_is_that_of_all_others() -> None
     assert found[2] == pytest.approx(np.max(energies[2, :-1]) / initial[2], rel=1e-12)
     assert found[3] == pytest.approx(np.max(energies[3]) / initial[3], rel=1e-12)
     assert found[2] < found[3]
+
+
+@pytest.mark.filterwarnings("error")
+@pytest.mark.parametrize("end", [np.inf, np.nan])
+def test_an_energy_that_is_not_finite_at_the_end_is_unclear(end: float) -> None:
+    running, one = np.array([0.0, *np.full(400, 1.0), *np.full(112, end)]), np.ones((1, 1))
+    wave = running * np.sign(WAVE)
+    found = drift_of(
+        *(running[None, None], 1.0 + wave[None, None], one, 1e-15 * one, np.array([PERIODS])),
+        wave[None, None],
+    )
+    assert DRIFTS[int(found.kind[0, 0])] == "unclear"
