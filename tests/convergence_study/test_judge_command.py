@@ -83,6 +83,14 @@ def test_values_are_written_so_that_their_differences_show(
     assert all(text in page for text in shown)
 
 
+def test_a_level_that_blew_up_does_not_fill_the_table_with_digits(
+    table: Callable[..., str], capsys: Capture
+) -> None:
+    rows = "0.1,1.25\n0.05,1.0625\n0.025,1.015625\n0.0125,1.2345678901234567e280\n"
+    assert main(["judge", table("dt,u\n" + rows), "--h", "dt"]) == 1
+    assert " 1.2345679e280" in capsys.readouterr().out
+
+
 def test_without_quantities_every_other_column_is_judged(
     table: Callable[..., str], capsys: Capture
 ) -> None:
