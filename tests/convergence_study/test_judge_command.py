@@ -304,6 +304,22 @@ def test_a_report_goes_to_a_folder(
     assert "must be a folder, " in captured.err
 
 
+def test_a_report_goes_to_a_folder_that_may_be_written_to(
+    table: Callable[..., str],
+    tmp_path: Path,
+    capsys: Capture,
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """Root may write anywhere, so the answer of the system is another one here."""
+    monkeypatch.setattr(os, "access", lambda path, mode: Path(path) != tmp_path)
+    for folder in (tmp_path, tmp_path / "new" / "report"):
+        assert main(["judge", table(TABLE), "--h", "dt", "--report", str(folder)]) == 2
+        captured = capsys.readouterr()
+        assert captured.out == ""
+        assert "is write-protected" in captured.err
+    assert [path.name for path in tmp_path.iterdir()] == ["study.csv"]
+
+
 @pytest.mark.slow
 def test_the_report_is_one_page_with_the_verdicts_beside_it(
     table: Callable[..., str], tmp_path: Path, capsys: Capture
