@@ -174,6 +174,11 @@ class OrderContext:
         """The largest stable w dt of the scheme, infinite for none; NaN if no level failed."""
         return math.nan if self.culprit < 0 else self._facts.stability_limit
 
+    @property
+    def of_limit(self) -> str:
+        """Words behind the limit: of which motion it is, if the motion is damped."""
+        return self._facts.of_limit
+
     @cached_property
     def growth_in_words(self) -> str:
         """A sentence on the growth of the solution at the culprit."""

@@ -48,7 +48,7 @@ DIAGNOSES: Words = {
     ),
     "unstable, beyond the limit": (
         "The run is unstable at level {culprit}, where w dt = {omega_dt:4} is beyond the limit {limit} of scheme "
-        "{scheme}. Level {first_stable} is the first within it.{growth_in_words}",
+        "{scheme}{of_limit}. Level {first_stable} is the first within it.{growth_in_words}",
         START_FINER,
     ),
     "unstable": (

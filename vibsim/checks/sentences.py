@@ -22,6 +22,7 @@ from vibsim.experiment.schema.checks import Measurement
 from vibsim.experiment.sweep_columns import options_of, recorded_columns
 from vibsim.models.base import Model
 from vibsim.schemes import Options
+from vibsim.schemes.orders import depends_on_velocity
 
 LONG = 120.0
 """Times above this [s] are written in minutes, and above sixty times this in hours."""
@@ -123,6 +124,11 @@ class MemberFacts:
         """The largest stable w dt; infinite if there is no limit."""
         limits = stability_limits(self.experiment, recorded_columns(self.record))
         return self.of_member(limits)
+
+    @property
+    def of_limit(self) -> str:
+        """Words behind a stability limit, which is that of the undamped motion; empty if nothing damps it."""
+        return " for the undamped motion" if depends_on_velocity(self.model) else ""
 
     @cached_property
     def failed_at(self) -> float:

@@ -213,7 +213,7 @@ def _advice(f: MemberFacts, level: int, w_dt: float, time: str) -> str:
     if math.isfinite(limit) and math.isfinite(w_dt) and w_dt > limit:
         return (
             f"Take finer `levels:`, from {first_within(limit, level, w_dt)} on (w dt within the limit "
-            f"{f.notation.number(limit)}), or correct `stable:`."
+            f"{f.notation.number(limit)}{f.of_limit}), or correct `stable:`."
         )
     if time:
         return (

@@ -125,6 +125,19 @@ def test_advice_on_stability_points_the_right_way() -> None:
     assert "finer" in unstable.advice
 
 
+@pytest.mark.parametrize("damping", [{}, {"damping": {"linear": 0.1}}])
+def test_a_limit_is_said_to_be_that_of_the_undamped_motion(damping: dict[str, Any]) -> None:
+    model = {"kind": "oscillator", "spring": "40*u", **damping}
+    checks = [{"stable": True}, {"converges": "u"}]
+    stable, order = spring(
+        ["rk4"], *checks, model=model, time={"end": 20.0, "base_steps": 40}
+    ).verdicts
+    assert ("2.82843 for the undamped motion)" in stable.advice) == bool(damping)
+    assert ("of scheme rk4 for the undamped motion. Level" in order.text) == bool(damping)
+    assert "w dt within the limit 2.82843" in stable.advice
+    assert "beyond the limit 2.82843 of scheme rk4" in order.text
+
+
 @pytest.mark.slow
 def test_a_tolerance_that_is_advised_suffices() -> None:
     check = {"equal": ["central", "exact"], "quantity": "u"}
