@@ -312,9 +312,7 @@ def test_a_trap_has_its_mark_and_its_order_beside_the_finding():
     plain = {"converges": "theta", "order": 2, "schemes": ["central"]}
     shown = first(samples.experiment(schemes=["central", *WRONG_AS_TRAP], checks=[plain, trap]))
     assert shown["marks"] == [(words.TRAP, 1)]
-    assert re.search(
-        r"As the trap expects, θ by wrong has order [01]\.\d{3}", shown["meaning"]
-    )
+    assert re.search(r"As the trap expects, θ by wrong has order [01]\.\d{3}", shown["meaning"])
 
 
 def test_statements_stand_beside_the_finding_but_not_the_one_that_is_the_finding():
