@@ -13,7 +13,7 @@ from vibsim.checks.order_sentences import DIAGNOSES, UNSEEN
 from vibsim.checks.sentences import Description, MemberFacts, Template, add_levels
 from vibsim.comparison.parting import levels_to_the_end
 from vibsim.convergence.study.sentences import higher_part, opposite_part
-from vibsim.convergence.thresholds import HALF_SPACING
+from vibsim.convergence.thresholds import HALF_SPACING, UNEVEN_SPEEDS
 from vibsim.core.decimals import order_interval
 from vibsim.core.vocabulary import is_error_part
 from vibsim.experiment.schema.checks import ConvergesCheck
@@ -24,9 +24,6 @@ HIGHEST = 12.0
 """No scheme has an order above this."""
 FAR_DOWN = 1.0
 """An interval that extends further below its order contains a lower power of the expansion."""
-UNEVEN_SPEEDS = 2.0
-"""Factor between the largest speeds of levels that part, above which the force may be infinite somewhere: those of a
-chaotic motion are alike."""
 LAST_ORDERS = 4
 """Number of the last orders that are reported."""
 HARDLY = 0.1

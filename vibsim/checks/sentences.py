@@ -16,6 +16,7 @@ from vibsim.checks.fields import field_values, name_of
 from vibsim.checks.notation import PLAIN, Notation
 from vibsim.core.array_types import Floats
 from vibsim.core.record import Record
+from vibsim.core.vocabulary import LEVELS_OF_AN_ORDER
 from vibsim.experiment import Experiment
 from vibsim.experiment.cost import level_cost
 from vibsim.experiment.schema.checks import Measurement
@@ -129,6 +130,19 @@ class MemberFacts:
     def of_limit(self) -> str:
         """Words behind a stability limit, which is that of the undamped motion; empty if nothing damps it."""
         return " for the undamped motion" if depends_on_velocity(self.model) else ""
+
+    @cached_property
+    def speeds_differ(self) -> float:
+        """The largest factor between the largest speeds of the finest three levels; NaN if they are not stored."""
+        ends = ("min", "max")
+        names = [f"{velocity}_{end}" for velocity in self.model.velocities for end in ends]
+        if any(name not in self.record for name in names):
+            return math.nan
+        of_levels = np.max(
+            [np.abs(self.record[name][self.scheme, self.case]) for name in names], axis=0
+        )
+        last = of_levels[-LEVELS_OF_AN_ORDER:]
+        return float(np.max(last) / np.min(last)) if np.min(last) > 0.0 else math.nan
 
     @cached_property
     def failed_at(self) -> float:
