@@ -244,3 +244,14 @@ def test_a_part_of_the_ladder_may_be_analysed() -> None:
     experiment = problem(range(6, 10), theta=1.0)
     record = analyse(experiment, tampered("not")[:3])
     assert list(record.level.values) == [6, 7, 8]
+
+
+@pytest.mark.usefixtures("with_series")
+@pytest.mark.parametrize("kind", ["rk4", "central", "newmark"])
+def test_levels_that_friction_stops_at_once_belong_to_their_exact_solution(kind: str) -> None:
+    """Their velocity is 0 throughout, and that of the exact solution at t = 0 has the rounding of its motion."""
+    model = {"kind": "oscillator", "spring": "u", "damping": {"coulomb": 0.1}}
+    checks = [{"accurate": "u", "relative": 1e-3}]
+    made = problem([1, 2, 3], kind, 30.0, u=1.0, model=model, checks=checks)
+    [(status, reason)], _ = outcome(made)
+    assert (status, reason) in (("FAIL", "unstable"), ("FAIL", "mismatch"))

@@ -198,6 +198,23 @@ def test_a_user_without_a_home_and_files_of_others_below(file: Path, tmp_path: P
     assert "report: " not in ended.stdout
 
 
+def test_a_report_in_the_place_of_a_file_is_refused(file: Path, tmp_path: Path) -> None:
+    for command in (["report", file], ["report"], ["analyse", file]):
+        for place in (file, file / "below"):
+            ended = vibsim(*command, "--results", tmp_path / "results", "--out", place)
+            assert ended.returncode == 2
+            assert "--out" in ended.stderr
+            assert "must be a folder, " in ended.stderr
+
+
+@needs_root
+@pytest.mark.slow
+def test_a_report_in_the_folder_of_another_user_is_refused(file: Path, tmp_path: Path) -> None:
+    ended = as_somebody("report", file, "--out", tmp_path / "new")
+    assert ended.returncode == 2
+    assert f"{tmp_path / 'new'}: must be a folder to write to, " in ended.stderr
+
+
 STRANGE = [
     "L" * 400,
     "é" * 400,

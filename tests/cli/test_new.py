@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 from pathlib import Path
 
 import jsonschema
@@ -35,6 +36,25 @@ def test_a_new_file_of_every_model_passes_as_it_is(kind: str, tmp_path: Path) ->
     assert max(map(len, text.splitlines())) <= 120
     for field in MODELS[kind].formulas:
         assert field.description in text
+
+
+def test_the_commands_that_it_names_work_where_the_user_is(
+    tmp_path: Path, capsys: Capture, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def named() -> str:
+        file.unlink(missing_ok=True)
+        assert main(["new", str(file)]) == 0
+        return capsys.readouterr().out
+
+    file, program = tmp_path / "mine.yaml", home() / ".venv/bin/vibsim"
+    monkeypatch.chdir(home())
+    assert f"check it: .venv/bin/vibsim check {file}\n" in named()
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setenv("PATH", os.defpath)
+    assert f"run it:   {program} run {file}\n" in named()
+    # that of an activated environment
+    monkeypatch.setenv("PATH", str(program.parent))
+    assert f"run it:   vibsim run {file}\n" in named()
 
 
 @pytest.mark.parametrize("kind", ["pendulum", "oscillator", "elastic_pendulum"])

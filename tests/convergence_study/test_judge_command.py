@@ -83,6 +83,21 @@ def test_values_are_written_so_that_their_differences_show(
     assert all(text in page for text in shown)
 
 
+def test_a_level_that_blew_up_does_not_fill_the_table_with_digits(
+    table: Callable[..., str], capsys: Capture
+) -> None:
+    rows = "0.1,1.25\n0.05,1.0625\n0.025,1.015625\n0.0125,1.2345678901234567e280\n"
+    assert main(["judge", table("dt,u\n" + rows), "--h", "dt"]) == 1
+    assert " 1.2345679e280" in capsys.readouterr().out
+
+
+def test_levels_that_are_all_the_same_have_a_table(
+    table: Callable[..., str], capsys: Capture
+) -> None:
+    assert main(["judge", table("dt,u\n0.1,1.5\n0.05,1.5\n0.025,1.5\n"), "--h", "dt"]) == 0
+    assert "0.025    1.5 " in capsys.readouterr().out
+
+
 def test_without_quantities_every_other_column_is_judged(
     table: Callable[..., str], capsys: Capture
 ) -> None:
@@ -294,6 +309,22 @@ def test_a_report_goes_to_a_folder(
     captured = capsys.readouterr()
     assert captured.out == ""
     assert "must be a folder, " in captured.err
+
+
+def test_a_report_goes_to_a_folder_that_may_be_written_to(
+    table: Callable[..., str],
+    tmp_path: Path,
+    capsys: Capture,
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """Root may write anywhere, so the answer of the system is another one here."""
+    monkeypatch.setattr(os, "access", lambda path, mode: Path(path) != tmp_path)
+    for folder in (tmp_path, tmp_path / "new" / "report"):
+        assert main(["judge", table(TABLE), "--h", "dt", "--report", str(folder)]) == 2
+        captured = capsys.readouterr()
+        assert captured.out == ""
+        assert "is write-protected" in captured.err
+    assert [path.name for path in tmp_path.iterdir()] == ["study.csv"]
 
 
 @pytest.mark.slow

@@ -843,3 +843,36 @@ def test_the_frequency_of_a_force_is_a_parameter_in_radians_per_second(
     (fault,) = error.value.faults
     assert rule in fault.rule
     assert hint in fault.hint
+
+
+@pytest.mark.parametrize(
+    ("bound", "key"),
+    [
+        ({"below": 3.2}, "below"),
+        ({"below": "pi"}, "below"),
+        ({"below": -4}, "below"),
+        ({"above": -3.2}, "above"),
+        ({"above": "-pi"}, "above"),
+        ({"above": 4}, "above"),
+        ({"equals": 3.0, "atol": 3.2}, "atol"),
+        ({"equals": 3.0, "rtol": 1.1}, "rtol"),
+    ],
+)
+def test_a_bound_that_every_phase_meets_or_none_is_refused(bound: dict[str, Any], key: str) -> None:
+    driven = {
+        "model": {"kind": "duffing"},
+        "initial": {"u": 1},
+        "time": {"periods": 4, "steps_per_period": 16, "frequency": "model.omega"},
+        "levels": [0, 1, 2],
+        "sweep": {"model.omega": [1.0, 1.1]},
+    }
+    for more in ({}, {"over": "model.omega", "take": "largest"}):
+        [fault] = faults_of(
+            **driven, checks=[{"value": "steady_phase", "quantity": "u", **bound, **more}]
+        )
+        assert fault.key == f"checks[0].{key}"
+        assert "phase" in fault.rule
+    # these are bounds of a swept value, and one that phases may miss
+    where = {"over": "model.omega", "take": "where", "below": 4}
+    for claim in (where, {"below": 3.1}, {"above": -3.1}, {"equals": 4.0, "atol": 1.0}):
+        build(**driven, checks=[{"value": "steady_phase", "quantity": "u", **claim}])

@@ -201,10 +201,18 @@ def test_a_module_that_is_nowhere_is_refused(
 ) -> None:
     text = TEXT.replace(f"command: {COMMAND}", "python: no_such_module_here:solve")
     heat.write_text(text)
-    assert "no_such_module_here: cannot be found" in faults(heat, capsys)[0]
+    (told,) = faults(heat, capsys)
+    assert told.startswith("3: solver.python: no_such_module_here:solve: cannot be found: ")
     (heat.parent / "no_such_module_here.py").write_text("raise SystemExit('imported')")
     # found, and not imported
     assert "has no function solve" in faults(heat, capsys)[0]
+    # a package beside the file, without and with the module
+    heat.write_text(text.replace("no_such_module_here", "slabs.inner"))
+    (heat.parent / "slabs").mkdir()
+    (told,) = faults(heat, capsys)
+    assert told.startswith("3: solver.python: slabs.inner:solve: cannot be found: ")
+    (heat.parent / "slabs" / "inner").mkdir()
+    assert main(["check", str(heat)]) == 0
 
 
 def test_a_function_and_a_program_beside_the_file_must_be_there(

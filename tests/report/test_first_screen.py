@@ -64,7 +64,7 @@ def test_every_reason_and_every_kind_of_check_has_a_title():
         ({"checks": [{"equal": ["central", "exact"], "quantity": "theta", "atol": 1.0}, {"stable": True}]},
          "Scheme central is stable, as expected"),
         ({"schemes": ["central", "rk4"], "checks": [{"stable": False, "schemes": ["central"]}]},
-         "The amplitude does not grow, against what is asked"),
+         "The amplitude by central does not grow, against what is asked"),
         ({"checks": [{"claim": "so", "that": {"value": "period", "above": 1.0}, "holds": False}]},
          "Not shown to be false: So"),
         ({"checks": [{"claim": "so", "that": {"value": "period", "below": 1.0}}]}, "Not confirmed: So"),
@@ -79,11 +79,30 @@ def test_every_reason_and_every_kind_of_check_has_a_title():
         ({"schemes": [*WRONG, {"kind": "central", "label": "sound"}],
           "checks": [{"converges": "theta", "order": 2, "schemes": ["sound"]},
                      {"converges": "theta", "order": 2, "schemes": ["central"], "expect": {"status": "FAIL"}}]},
-         "The angle θ converges at second order with scheme sound, and the trap is caught"),
+         "The angle θ by sound converges at second order, and the trap is caught"),
+        ({"schemes": ["central", {"kind": "euler_cromer", "label": "ec"}],
+          "checks": [{"value": "relative_energy_error", "below": 1e-3}]},
+         "Relative energy error by ec is not as expected"),
     ],
 )  # fmt: skip
 def test_the_title_says_the_finding(changes, title):
     assert first(samples.experiment(**changes))["finding"] == title
+
+
+@pytest.mark.parametrize(
+    ("check", "told"),
+    [
+        ({"value": "period", "below": 1.0}, r"It is 6\.7\d* s, not below 1 s\."),
+        ({"value": "period", "equals": 1, "atol": 0.5}, r"It is 6\.7\d* s, not equal to 1 within 0\.5 s\."),
+        ({"equal": ["central", "exact"], "quantity": "theta", "atol": 1e-9},
+         r"They are at most 0\.0\d+ rad apart; 10⁻⁹ rad is allowed\."),
+        ({"accurate": "theta", "relative": 1e-9},
+         r"The error is [\d·⁻.]+ of its size at level 9.*; 10⁻⁹ is asked for\."),
+    ],
+)  # fmt: skip
+def test_under_a_title_that_says_what_failed_are_its_numbers_with_units(check, told):
+    shown = first(samples.experiment(levels=[6, 7, 8, 9], checks=[check]))
+    assert re.fullmatch(told, shown["meaning"]), shown["meaning"]
 
 
 @pytest.mark.parametrize(
@@ -293,9 +312,7 @@ def test_a_trap_has_its_mark_and_its_order_beside_the_finding():
     plain = {"converges": "theta", "order": 2, "schemes": ["central"]}
     shown = first(samples.experiment(schemes=["central", *WRONG_AS_TRAP], checks=[plain, trap]))
     assert shown["marks"] == [(words.TRAP, 1)]
-    assert re.search(
-        r"As the trap expects, θ has order [01]\.\d{3} with scheme wrong", shown["meaning"]
-    )
+    assert re.search(r"As the trap expects, θ by wrong has order [01]\.\d{3}", shown["meaning"])
 
 
 def test_statements_stand_beside_the_finding_but_not_the_one_that_is_the_finding():
@@ -601,7 +618,7 @@ def test_of_several_schemes_the_one_that_decides_is_named():
         schemes=["central", wrong], checks=[{"converges": "theta", "order": 2}]
     )
     shown = first(exp)
-    title = "The angle θ converges at first order, not at second, with wrong"
+    title = "The angle θ by wrong converges at first order, not at second"
     assert shown["finding"] == title
     assert all(number["label"].endswith(", wrong") for number in shown["numbers"])
 

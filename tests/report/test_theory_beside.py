@@ -346,6 +346,10 @@ def test_a_printed_number_keeps_its_digits(printed, shown):
     assert words.printed(printed) == shown
     assert words.in_style_of(0.012345678, "1.221e-2") == "1.23457·10⁻²"
     assert words.in_style_of(4.934802, "4.93") == "4.9348"
+    # one that blew up has not hundreds of digits
+    assert words.in_style_of(1.5e300, "4.93") == "1.500·10³⁰⁰"
+    assert words.in_style_of(1.5e300, "4.93e2") == "1.5000·10³⁰⁰"
+    assert words.in_style_of(123456789012345.0, "1234567890123456") == "123456789012345.00"
 
 
 def test_a_file_holds_the_number_and_a_page_the_text():

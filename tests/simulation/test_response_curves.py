@@ -332,7 +332,7 @@ def test_the_bound_of_a_motion_that_is_not_steady_yet_reaches_the_steady_one(
             "schemes": ["rk4"],
             "sweep": {"model.parameters.omega": w.tolist()},
             "checks": [
-                {"value": name, "quantity": "u", "above": -9, "at": {"level": "best"}}
+                {"value": name, "quantity": "u", "above": -3, "at": {"level": "best"}}
                 for name in ("steady_amplitude", "steady_phase")
             ],
         }

@@ -3,8 +3,10 @@
 Where the force changes by d^k at a distance d behind a point, a step across that point has an error of order dt^(k+1)
 that depends on the position of the point within the step, which differs between levels. So no order above k + 1 is
 regular once the motion meets it: k + 1 is 1 for a jump of the force, 2 for ``abs(u)``, 2.5 for ``max(u, 0)**1.5``, and
-3 for quadratic damping ``abs(v) v`` where the velocity vanishes. At a grid point only a jump of the force itself
-matters, because the steps before and after the point evaluate the same one of its two values. Switches
+3 for quadratic damping ``abs(v) v`` where the velocity vanishes. At a grid point most corners do not matter, since each
+step is on one side of it, where the force is smooth. But a jump of the force itself does, because the steps before and
+after the point evaluate the same one of its two values, and so does a broken power such as ``max(u, 0)**1.5``, which is
+not smooth up to the corner. Switches
 (`vibsim.formula.jumps`) are followed along the samples of the finest level, and k follows from the difference of the
 two formulas on either side. The corners of tables are known in advance (`vibsim.apriori.table_corners`).
 """
@@ -12,7 +14,7 @@ two formulas on either side. The corners of tables are known in advance (`vibsim
 from __future__ import annotations
 
 import itertools
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache
 from typing import Any
@@ -44,6 +46,18 @@ TURN_ERROR = 0.5
 """Error of an extrapolation where the slope of a table changes by s, as a multiple of ``s dt^2``. [convention]"""
 MOST_SMOOTH = 8
 """Jumps of this derivative and of higher ones are ignored. [convention]"""
+AROUND = (0.5, 1.5, 2.5)
+EVEN, ODD = (2.0, -3.0, 1.0), (10.0, -5.0, 1.0)
+"""Places around a corner, and weights of sums and differences of the force there, which are of order 4 and 5 where it
+is smooth. [derived]"""
+LEFT_BY_SMOOTH = 4.0
+"""Powers from this one on are not told from what a smooth force leaves of these. [derived]"""
+ROUNDED = 1e-13
+"""Part of the force below which these are rounding. [derived]"""
+
+
+Matters = Callable[[Floats], Flags]
+"""Tells of powers k + 1 whether a corner of this power lowers the order."""
 
 
 @dataclass(frozen=True)
@@ -185,6 +199,10 @@ def _of_scheme(
     u, v = np.split(states.reshape(len(states), -1), 2)
     q, modes = law.modes(u, v, t.ravel())
     q, modes = (row.reshape(len(q), cases, samples) for row in (q, modes))
+    # a quantity that falls from zero at t = 0 passes it there
+    starts = np.zeros(q[..., 1:].shape, dtype=bool)
+    starts[..., 0] = (q[..., 0] == 0.0) & (q[..., 1] < 0.0) & ~law.whole[:, None]
+    modes[..., :-1][starts] = 0.0
     edge = np.maximum(modes[..., :-1], modes[..., 1:])
     edge = np.where(law.whole[:, None, None], edge, 0.0)
     fraction = (edge - q[..., :-1]) / (q[..., 1:] - q[..., :-1])
@@ -198,8 +216,8 @@ def _of_scheme(
     is_within = ~is_on_a_point(at, dt[:, None])
     every = np.arange(cases)
 
-    def first(when: Floats, *, is_jump: bool = False) -> tuple[Floats, Floats, Integers]:
-        """Return the earliest corner, or nothing if a jump is asked for and it is none.
+    def first(when: Floats, matters: Matters = np.isfinite) -> tuple[Floats, Floats, Integers]:
+        """Return the earliest corner, or nothing if its power does not matter.
 
         `when` has the times of corners, infinite elsewhere, shape (switch, case, sample).
         """
@@ -218,29 +236,44 @@ def _of_scheme(
         size = np.nanmax(np.abs(q), axis=-1)[switch, every]
         exists = np.isfinite(when[switch, every, sample])
         power = np.where(exists, path.power(edge[switch, every, sample], size), np.nan)
-        exists &= (power == 1.0) if is_jump else np.isfinite(power)
+        exists &= matters(power)
         return (
             np.where(exists, power, np.nan),
             np.where(exists, when[switch, every, sample], np.nan),
             np.where(exists, switch - len(law.switches) + len(switches_of(law.model)), -1),
         )
 
-    jump = first(np.where(passed & in_time & ~is_within, at, np.inf), is_jump=True)
-    # the first passage of each switch inside a step
-    masks = np.eye(len(q), dtype=bool)[:, :, None, None]
-    corners = [first(np.where(passed & is_within & mask, at, np.inf)) for mask in masks]
+    def firsts(where: Flags, matters: Matters = np.isfinite) -> list[Any]:
+        """Return the earliest corner of each switch."""
+        masks = np.eye(len(q), dtype=bool)[:, :, None, None]
+        return [first(np.where(where & mask, at, np.inf), matters) for mask in masks]
+
+    def roughest(corners: list[Any]) -> list[Any]:
+        """Return the roughest of several corners, and the earliest if several are equally rough."""
+        powers, times, switches = (np.stack(column) for column in zip(*corners, strict=True))
+        which = np.lexsort((times, powers), axis=0)[0]
+        return [column[which, every] for column in (powers, times, switches)]
+
+    inside = firsts(passed & is_within)
     if at_event.any():
-        # as at a grid point, only a jump matters
-        corners += [first(np.where(at_event & mask, at, np.inf), is_jump=True) for mask in masks]
-    powers, times, switches = (np.stack(column) for column in zip(*corners, strict=True))
-    # the roughest of these, and the earliest if several are equally rough
-    which = np.lexsort((times, powers), axis=0)[0]
-    least, least_time, switch = powers[which, every], times[which, every], switches[which, every]
-    is_jump = np.isfinite(jump[0]) & ~((least <= 1.0) & (least_time <= jump[1]))
-    power, time, switch = (
-        np.where(is_jump, *pair) for pair in zip(jump, (least, least_time, switch), strict=True)
-    )
+        inside += firsts(at_event, lambda power: _jumps(power) | _is_broken(power))
+    on_points, is_on_point = [], passed & ~is_within
+    if is_on_point.any():
+        # the force at t = 0 is that behind its jump there
+        jumps = is_on_point & in_time & ~starts
+        on_points = [first(np.where(jumps, at, np.inf), _jumps)]
+        on_points += firsts(is_on_point, _is_broken)
+    power, time, switch = roughest([*inside, *on_points])
+    least, least_time, _ = roughest(inside)
     return power, time, np.asarray(switch, dtype=np.int64), least, least_time
+
+
+def _jumps(power: Floats) -> Flags:
+    return np.asarray(power == 1.0)
+
+
+def _is_broken(power: Floats) -> Flags:
+    return np.asarray(np.isfinite(power) & (power % 1.0 != 0.0))
 
 
 def _changed_at_events(model: Model) -> Collection[str]:
@@ -283,8 +316,9 @@ class _Path:
 
     def crossing(self, edge: Floats) -> Floats:
         """Return the fraction of the path at which the switch quantity is `edge`, by bisection."""
-        low, high = np.zeros(len(edge)), np.ones(len(edge))
+        low = np.zeros(len(edge))
         start = self.quantity(low) > edge
+        high = np.where(self.quantity(low) == edge, 0.0, 1.0)
         for _ in range(HALVINGS):
             middle = 0.5 * (low + high)
             is_before = (self.quantity(middle) > edge) == start
@@ -298,7 +332,15 @@ class _Path:
         """
         s = self.crossing(edge)
         slope = self.quantity(np.ones(len(s))) - self.quantity(np.zeros(len(s)))
-        gaps = [self._gap(s, distance * size / slope) for distance in DISTANCES]
+        distances = [distance * size / slope for distance in DISTANCES]
+        gaps = [self._gap(s, distance) for distance in distances]
+        # of a power such as abs(u)**1.5 no formula goes on behind the corner
+        most = np.where(np.isnan(gaps[0]), LEFT_BY_SMOOTH, MOST_SMOOTH)
+        if np.isnan(gaps[0]).any():
+            gaps = [
+                np.where(np.isnan(gap), self._broken_part(s, distance), gap)
+                for gap, distance in zip(gaps, distances, strict=True)
+            ]
         fall = DISTANCES[0] / DISTANCES[1]
         far, near = (
             on_arrays.log(a / b) / on_arrays.log(fall) for a, b in itertools.pairwise(gaps)
@@ -306,7 +348,7 @@ class _Path:
         k = np.where(far < DIGITS_LEFT, (fall * near - far) / (fall - 1.0), far)
         whole = np.round(k)
         k = np.where((np.abs(k - whole) <= WHOLE) | (far >= DIGITS_LEFT), whole, np.round(k, 2))
-        exists = (gaps[0] > 0.0) & (k < MOST_SMOOTH)
+        exists = (gaps[0] > 0.0) & (k < most)
         return np.where(exists, np.maximum(k, 0.0) + 1.0, np.nan)
 
     def _gap(self, s: Floats, distance: Floats) -> Floats:
@@ -318,6 +360,19 @@ class _Path:
         there, back = sides
         mean = 0.5 * (there + back)
         return np.asarray(np.where(np.isnan(mean), np.fmax(there, back), mean))
+
+    def _broken_part(self, s: Floats, distance: Floats) -> Floats:
+        """Return what the forces around a fraction `s`, each by its own formula, have beside smooth parts."""
+        before, after = (self.law.force(modes) for modes in self.modes)
+        parts: list[Floats] = [np.zeros(1)] * 3
+        for place, even, odd in zip(AROUND, EVEN, ODD, strict=True):
+            reach = place * np.abs(distance)
+            behind, beyond = before(*self.at(s - reach)), after(*self.at(s + reach))
+            sizes = np.abs(behind) + np.abs(beyond)
+            rows = even * (beyond + behind), odd * (beyond - behind), abs(odd) * sizes
+            parts = [part + row for part, row in zip(parts, rows, strict=True)]
+        left = np.maximum(np.abs(parts[0]), np.abs(parts[1]))
+        return np.asarray(np.max(np.where(left > ROUNDED * parts[2], left, 0.0), axis=0))
 
 
 def corner_variables(model: Model, corners: Corners) -> dict[str, Variable]:

@@ -282,7 +282,7 @@ class _Phrases:
         if needed < 0:
             return f"Take finer `levels:` or a scheme of higher order (`schemes:`), or c{change}."
         add = add_levels(self.level, needed - self.level, self.cost)
-        return f"A{add}. By the measured order, that is probably enough. Or c{change}."
+        return f"A{add}, which is probably enough by the measured order, or c{change}."
 
     def more_levels(self) -> str:
         """Say how to find the order."""

@@ -8,6 +8,7 @@ import numpy as np
 
 from vibsim.checks.energy import lies_still
 from vibsim.checks.fields import LEVEL, MOTION, Field, Measured
+from vibsim.checks.number_units import unit_of_quantity
 from vibsim.checks.outcome import Judged
 from vibsim.checks.sentences import MOVE, NOT_FINITE, NOTHING_MOVES, Description, MemberFacts
 from vibsim.comparison.quantity_comparison import Compared
@@ -107,10 +108,10 @@ def other_solution(check: EqualCheck) -> str:
 def describe(f: MemberFacts, check: EqualCheck) -> Description:
     """Say how far apart two solutions are, and what to change if that is too far."""
     what, other = f.notation.opening(f.notation.quantity(check.quantity)), other_solution(check)
-    distance, allowed, number = f.fact("distance"), f.fact("allowed"), f.notation.number
+    distance, allowed = f.fact("distance"), f.fact("allowed")
     both = f"{what} of scheme {check.first} and {other}"
-    distance_text = f"at most {number(distance, 4)} apart"
-    brief = f"{distance_text}; {number(allowed, 4)} is allowed"
+    distance_text = f"at most {_size(f, check, distance)} apart"
+    brief = f"{distance_text}; {_size(f, check, allowed)} is allowed"
     if distance == 0.0:
         brief = "identical in every digit"
     enough = f"above {round_outward(distance, 2):.2g} if that is close enough"
@@ -142,3 +143,8 @@ def describe(f: MemberFacts, check: EqualCheck) -> Description:
                 ways = ", take a finer `level:`,"
             advice = f"Correct `equal:`{ways} or give `atol:` {enough}."
     return Description(sentence, advice, brief)
+
+
+def _size(f: MemberFacts, check: EqualCheck, distance: float) -> str:
+    """Write a distance with its unit."""
+    return f"{f.notation.number(distance, 4)} {unit_of_quantity(f.record, check.quantity)}".rstrip()

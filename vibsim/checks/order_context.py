@@ -24,7 +24,6 @@ from vibsim.checks.stable import SAME_TIME, first_within
 from vibsim.comparison.comparison_variables import has_exact
 from vibsim.core.record import Record
 from vibsim.core.vocabulary import (
-    LEVELS_OF_AN_ORDER,
     POSITION_VECTOR,
     TYPICAL_NORM,
     is_error_part,
@@ -137,16 +136,10 @@ class OrderContext:
         place = self._facts.scheme, self._facts.case, -1, norm
         return {name: float(record[f"{name}_difference_norm"][place]) ** 2 for name in names}
 
-    @cached_property
+    @property
     def speeds_differ(self) -> float:
         """The largest factor between the largest speeds of the finest three levels; NaN if they are not stored."""
-        f, ends = self._facts, ("min", "max")
-        names = [f"{velocity}_{end}" for velocity in f.model.velocities for end in ends]
-        if any(name not in f.record for name in names):
-            return math.nan
-        of_levels = np.max([np.abs(f.record[name][f.scheme, f.case]) for name in names], axis=0)
-        last = of_levels[-LEVELS_OF_AN_ORDER:]
-        return float(np.max(last) / np.min(last)) if np.min(last) > 0.0 else math.nan
+        return self._facts.speeds_differ
 
     @cached_property
     def centred(self) -> float:
@@ -173,6 +166,11 @@ class OrderContext:
     def limit(self) -> float:
         """The largest stable w dt of the scheme, infinite for none; NaN if no level failed."""
         return math.nan if self.culprit < 0 else self._facts.stability_limit
+
+    @property
+    def of_limit(self) -> str:
+        """Words behind the limit: of which motion it is, if the motion is damped."""
+        return self._facts.of_limit
 
     @cached_property
     def growth_in_words(self) -> str:

@@ -48,7 +48,7 @@ DIAGNOSES: Words = {
     ),
     "unstable, beyond the limit": (
         "The run is unstable at level {culprit}, where w dt = {omega_dt:4} is beyond the limit {limit} of scheme "
-        "{scheme}. Level {first_stable} is the first within it.{growth_in_words}",
+        "{scheme}{of_limit}. Level {first_stable} is the first within it.{growth_in_words}",
         START_FINER,
     ),
     "unstable": (
@@ -149,7 +149,7 @@ DIAGNOSES: Words = {
         "End the time interval (`time: end`) before t = {corner.time:4}, or choose steps that have a grid point there.",
     ),
     "non_smooth, corner": (
-        CANNOT_SHOW + "{jump} within a step ({corner.words} at t = {corner.time:4}). Expect order "
+        CANNOT_SHOW + "{jump} {corner_place} ({corner.words} at t = {corner.time:4}). Expect order "
         "{corner.power}{beside_corner}.",
         "{end_before_corner}",
     ),

@@ -13,7 +13,7 @@ from vibsim.checks.order_sentences import DIAGNOSES, UNSEEN
 from vibsim.checks.sentences import Description, MemberFacts, Template, add_levels
 from vibsim.comparison.parting import levels_to_the_end
 from vibsim.convergence.study.sentences import higher_part, opposite_part
-from vibsim.convergence.thresholds import HALF_SPACING
+from vibsim.convergence.thresholds import HALF_SPACING, UNEVEN_SPEEDS
 from vibsim.core.decimals import order_interval
 from vibsim.core.vocabulary import is_error_part
 from vibsim.experiment.schema.checks import ConvergesCheck
@@ -24,9 +24,6 @@ HIGHEST = 12.0
 """No scheme has an order above this."""
 FAR_DOWN = 1.0
 """An interval that extends further below its order contains a lower power of the expansion."""
-UNEVEN_SPEEDS = 2.0
-"""Factor between the largest speeds of levels that part, above which the force may be infinite somewhere: those of a
-chaotic motion are alike."""
 LAST_ORDERS = 4
 """Number of the last orders that are reported."""
 HARDLY = 0.1
@@ -66,8 +63,11 @@ def _diagnosis(s: OrderContext) -> str:
             "pulse": s.cause == "pulse",
             "mesh": is_on_the_mesh(s.options),
             "table": not math.isnan(s.table_corner),
-            "jump at a point": corner is not None and corner.on_a_point,
-            "irregular": corner is not None and not less and s.expected <= corner.power,
+            "jump at a point": corner is not None and corner.on_a_point and corner.power == 1.0,
+            "irregular": corner is not None
+            and not corner.on_a_point
+            and not less
+            and s.expected <= corner.power,
             "corner": corner is not None,
         },
         "pre_asymptotic": {
@@ -258,6 +258,9 @@ class _Phrases(OrderContext):
         known = {1.0: "the force jumps", 2.0: "the force has a corner"}
         return known.get(power, "a derivative of the force jumps")
 
+    def corner_place(self) -> str:
+        return "at a grid point" if self.corner and self.corner.on_a_point else "within a step"
+
     def beside_corner(self) -> str:
         """Add the last estimate, and the order that the scheme promises without the corner if that is too low."""
         text = f"; the last estimate is {self.measured()}" if self.order > 0.0 else ""
@@ -270,6 +273,11 @@ class _Phrases(OrderContext):
         """Ask to end before the corner, or for a scheme of an order that the corner leaves regular."""
         assert self.corner is not None
         number, power = self.notation.number, self.corner.power
+        if self.corner.on_a_point and power > 1.0:
+            # a broken power leaves this order regular there
+            before = f" before t = {number(self.corner.time, 4)}"
+            end = f", or end the time interval (`time: end`){before}" * (self.corner.time > 0.0)
+            return f"Set `order: {number(power)}`{end}."
         most, order = max(power - 1.0, 1.0), self.promised if self.promises_less else self.expected
         start = "Set `order: scheme`, and end" if self.promises_less else "End"
         lower = (

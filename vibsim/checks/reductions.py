@@ -270,7 +270,8 @@ def _asked(f: MemberFacts, check: ValueCheck) -> tuple[str, str, str]:
     if check.take == "monotone":
         way = DIRECTIONS[float(check.equals or 0.0)]
         return ", as asked", f"; it may or may not be that it {way}", f"; asked is that it {way}"
-    rule = value_text.rule(check, f.notation)
+    unit = number_units.unit_of(f.experiment, f.record, check)
+    rule = value_text.rule(check, f.notation, unit)
     return f"; it is {rule}", f"; it may or may not be {rule}", f"; it is not {rule}"
 
 

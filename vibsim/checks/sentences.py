@@ -16,12 +16,14 @@ from vibsim.checks.fields import field_values, name_of
 from vibsim.checks.notation import PLAIN, Notation
 from vibsim.core.array_types import Floats
 from vibsim.core.record import Record
+from vibsim.core.vocabulary import LEVELS_OF_AN_ORDER
 from vibsim.experiment import Experiment
 from vibsim.experiment.cost import level_cost
 from vibsim.experiment.schema.checks import Measurement
 from vibsim.experiment.sweep_columns import options_of, recorded_columns
 from vibsim.models.base import Model
 from vibsim.schemes import Options
+from vibsim.schemes.orders import depends_on_velocity
 
 LONG = 120.0
 """Times above this [s] are written in minutes, and above sixty times this in hours."""
@@ -123,6 +125,24 @@ class MemberFacts:
         """The largest stable w dt; infinite if there is no limit."""
         limits = stability_limits(self.experiment, recorded_columns(self.record))
         return self.of_member(limits)
+
+    @property
+    def of_limit(self) -> str:
+        """Words behind a stability limit, which is that of the undamped motion; empty if nothing damps it."""
+        return " for the undamped motion" if depends_on_velocity(self.model) else ""
+
+    @cached_property
+    def speeds_differ(self) -> float:
+        """The largest factor between the largest speeds of the finest three levels; NaN if they are not stored."""
+        ends = ("min", "max")
+        names = [f"{velocity}_{end}" for velocity in self.model.velocities for end in ends]
+        if any(name not in self.record for name in names):
+            return math.nan
+        of_levels = np.max(
+            [np.abs(self.record[name][self.scheme, self.case]) for name in names], axis=0
+        )
+        last = of_levels[-LEVELS_OF_AN_ORDER:]
+        return float(np.max(last) / np.min(last)) if np.min(last) > 0.0 else math.nan
 
     @cached_property
     def failed_at(self) -> float:

@@ -3,7 +3,8 @@
 A scheme is unstable if it overflows, if w dt exceeds its stability limit, or if it grows more than the exact solution
 and refinement within the ladder does not remove the growth (``docs/verdicts.md``, Stable, conserves, equal). The growth
 of Forward Euler vanishes with dt and does not count. An overflow whose time does not change on finer levels is a
-property of the motion (an escape, or a formula without a value), not an instability. At the limit itself a scheme may
+property of the motion (an escape, or a formula without a value), not an instability. If the motion becomes infinite and
+the levels pass through that, their speeds tell of it, and nothing is decided. At the limit itself a scheme may
 be stable or grow in proportion to t: there only the measurement decides.
 
 Beyond the limit of a linear model the growth must be the predicted one. The amplitude may follow with a delay: at a
@@ -23,22 +24,28 @@ from vibsim.checks.notation import ROUND_OFF
 from vibsim.checks.outcome import Judged
 from vibsim.checks.sentences import Description, MemberFacts, growth_in_words
 from vibsim.comparison.quantity_comparison import Compared
-from vibsim.convergence.reasons import FAIL, PASS, STATUS_OF, code, first_reason
-from vibsim.convergence.thresholds import BLOWN_UP, LIMIT_ROUNDING
+from vibsim.convergence.reasons import FAIL, INCONCLUSIVE, PASS, STATUS_OF, code, first_reason
+from vibsim.convergence.thresholds import (
+    BLOWN_UP,
+    LIMIT_ROUNDING,
+    RESOLVED_DECAY,
+    UNEVEN_SPEEDS,
+)
 from vibsim.core.array_types import Flags, Floats
 from vibsim.core.record import Record
-from vibsim.core.vocabulary import REASON_NAMES
+from vibsim.core.vocabulary import LEVELS_OF_AN_ORDER, REASON_NAMES
 from vibsim.elementary import on_arrays
 from vibsim.elementary.exponential import log2
 from vibsim.experiment import Experiment
 from vibsim.experiment.schema.checks import StableCheck
 from vibsim.observe import oscillation, predicted_oscillation
-from vibsim.observe.member_block import MemberBlock
+from vibsim.observe.member_block import MemberBlock, by_level, stored_or_nan
 
 FIELDS = {
     "status": STATUS,
     "reason": Field(
-        "match where it is stable, mismatch where theory and growth differ, non_finite where the motion itself ends",
+        "match where it is stable, mismatch where theory and growth differ, non_finite where the motion itself ends, "
+        "pre_asymptotic where no level follows it",
         np.int8,
         REASON_NAMES,
     ),
@@ -57,6 +64,8 @@ FAR = 1000.0
 Theory knows a single oscillation without damping; the square of its growth is allowed."""
 GROWS = 1.01
 """Least growth factor per period of a motion that grows."""
+COARSE = 1.0
+"""Step over the inverse frequency of small oscillations above which speeds depend on the step."""
 GROWTH_TOLERANCE = 0.1
 """Largest relative deviation of the logarithm of a growth from the predicted one."""
 
@@ -77,7 +86,12 @@ def measure(block: MemberBlock, compared: Compared, check: StableCheck) -> Measu
     contradicted &= _differs(block, index, measured, predicted)
     exceeds_theory = _is_beyond_theory(block, index, predicted)
     unstable = (broken & ~escaped) | exceeds_limit | grown | exceeds_theory
-    cases = [(contradicted, "mismatch"), (unstable, "unstable"), (escaped, "non_finite")]
+    cases = [
+        (contradicted, "mismatch"),
+        (unstable, "unstable"),
+        (escaped, "non_finite"),
+        (_meets_a_pole(block), "pre_asymptotic"),
+    ]
     reason = first_reason(cases, "match")
     return {
         "status": STATUS_OF[reason],
@@ -118,6 +132,26 @@ def _fail_at_same_time(block: MemberBlock) -> Flags:
     return np.asarray(np.all(block.failed[..., -2:], axis=-1) & is_same)
 
 
+def _meets_a_pole(block: MemberBlock) -> Flags:
+    """Say where the largest speeds of the finest levels tell of an infinite force, shape (scheme, case).
+
+    They differ, and do not fall with the step, as the growth of a scheme does. With an exact solution there is none,
+    and speeds of levels that broke down, or are too coarse for the motion, tell nothing.
+    """
+    names = [f"{velocity}_{end}" for velocity in block.model.velocities for end in ("min", "max")]
+    levels = block.grid.levels[-LEVELS_OF_AN_ORDER:]
+    rows = [[stored_or_nan(block.records[n], name, block.shape) for name in names] for n in levels]
+    speeds = by_level([np.max(np.abs(np.stack(row)), axis=0) for row in rows])
+    count = len(levels)
+    is_coarse = np.any(block.omega_dt[:, -count:] > COARSE, axis=-1)
+    is_coarse = is_coarse | (block.decay * block.group.end / block.grid.steps[-1] > RESOLVED_DECAY)
+    is_used = ~np.any(block.failed[..., -count:], axis=-1) & np.isnan(block.growth[..., -1])
+    with np.errstate(invalid="ignore", divide="ignore"):
+        is_uneven = np.max(speeds, axis=-1) > UNEVEN_SPEEDS * np.min(speeds, axis=-1)
+        falls = np.all(np.diff(speeds, axis=-1) < 0.0, axis=-1)
+    return np.asarray(is_used & is_uneven & ~falls & ~is_coarse & ~block.adaptive[:, None])
+
+
 def _differs(block: MemberBlock, index: int, measured: Floats, expected: Floats) -> Flags:
     periods = predicted_oscillation.natural_frequency(block) * block.group.end / (2.0 * np.pi)
     with np.errstate(divide="ignore", invalid="ignore"):
@@ -133,7 +167,9 @@ def judge(experiment: Experiment, record: Record, check: StableCheck, facts: Mea
         size = np.abs(on_arrays.log(facts["growth"]))
     as_expected = facts["reason"] == code("match" if check.stable else "unstable")
     away = np.where(np.isnan(size), np.inf, size)
-    return Judged(facts["reason"], away, np.where(as_expected, PASS, FAIL))
+    is_open = facts["reason"] == code("pre_asymptotic")
+    status = np.where(as_expected, PASS, np.where(is_open, INCONCLUSIVE, FAIL))
+    return Judged(facts["reason"], away, status)
 
 
 def describe(f: MemberFacts, check: StableCheck) -> Description:
@@ -148,6 +184,15 @@ def describe(f: MemberFacts, check: StableCheck) -> Description:
             "the motion itself escapes or a formula has no finite value, so this says nothing about stability.",
             f"End the time interval (`time: end`){f' before t = {time}' if time else ''}, or check the formulas of "
             "`model:`.",
+        )
+    if f.reason == "pre_asymptotic":
+        factor = f.speeds_differ
+        by = f" by a factor of {number(factor, 2)}" if math.isfinite(factor) else ""
+        return Description(
+            f"The largest speeds of the finest levels of scheme {f.scheme_name} differ{by}, as where a force becomes "
+            "infinite. No level follows a motion through such a point, so this says nothing about stability.",
+            "End the time interval (`time: end`) before the force becomes infinite, or take finer `levels:` if the "
+            "step is too coarse.",
         )
     factors = f.fact("predicted_growth"), f.fact("growth")
     brief = f"{'stable' if f.reason == 'match' else 'unstable'} at level {level}"
@@ -213,7 +258,7 @@ def _advice(f: MemberFacts, level: int, w_dt: float, time: str) -> str:
     if math.isfinite(limit) and math.isfinite(w_dt) and w_dt > limit:
         return (
             f"Take finer `levels:`, from {first_within(limit, level, w_dt)} on (w dt within the limit "
-            f"{f.notation.number(limit)}), or correct `stable:`."
+            f"{f.notation.number(limit)}{f.of_limit}), or correct `stable:`."
         )
     if time:
         return (

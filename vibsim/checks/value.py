@@ -77,6 +77,8 @@ def measure(block: MemberBlock, compared: Compared, check: ValueCheck) -> Measur
     )
     best = best_values.value(name, place)
     value, bound, missed = (np.broadcast_to(x, block.shape) for x in best)
+    if name == "event_count" and at.level is None:
+        bound = np.where(_counts_differ(block, check), np.inf, bound)
     fulfilled, _ = compare(check, value)
     numbers = np.full((*block.shape, len(levels)), np.nan)
     is_open = np.isnan(bound) & row.has_limit(at.level)
@@ -100,6 +102,21 @@ def measure(block: MemberBlock, compared: Compared, check: ValueCheck) -> Measur
         "level_as_asked": first,
         "value_by_level": numbers,
     }
+
+
+def _counts_differ(block: MemberBlock, check: ValueCheck) -> Flags:
+    """Tell whether the finest levels answer a check differently by their numbers of events, shape (scheme, case).
+
+    Levels that broke down do not count.
+    """
+    rows = [block.records[level] for level in block.grid.levels[-LEVELS_OF_AN_ORDER:]]
+    counts = [np.asarray(row["event_count"], dtype=np.float64) for row in rows]
+    answers = counts if check.take is not None else [compare(check, count)[0] for count in counts]
+    differ = [
+        (answer != answers[-1]) & (row["status"] == 0)
+        for row, answer in zip(rows, answers, strict=True)
+    ]
+    return np.asarray(np.any(differ, axis=0))
 
 
 def _by_level(name: str, place: value_numbers.Place) -> Floats:
@@ -233,6 +250,6 @@ def room(check: ValueCheck, value: Any) -> Any:
 
 def distance_to_the_cut(check: ValueCheck, value: Any) -> Any:
     """Return the distance of angles from -pi and pi, where they wrap around; infinite if that does not matter."""
-    key, wanted = border(check)
-    is_cut = check.number.is_angle and key != "equals" and abs(wanted) < np.pi
+    key, _ = border(check)
+    is_cut = check.number.is_angle and key != "equals"
     return np.pi - np.abs(value) if is_cut else math.inf

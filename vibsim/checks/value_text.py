@@ -96,7 +96,8 @@ def rule(check: ValueCheck, notation: Notation = PLAIN, unit: str = "") -> str:
 def describe(f: MemberFacts, check: ValueCheck) -> Description:
     """State a number, whether it meets the check, and what to change."""
     subject = f.notation.opening(what(check, f.notation))
-    brief, expected = _measured(f, check), rule(check, f.notation)
+    unit = unit_of(f.experiment, f.record, check)
+    brief, expected = _measured(f, check), rule(check, f.notation, unit)
     match f.reason:
         case "match":
             sentence, advice = f"{subject} is {brief}; it is {expected}.", ""

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 from vibsim.cli import outcome_text
 from vibsim.cli.jobs.common import refusal
 from vibsim.core.errors import DamagedFileError, VibsimError, nearest
-from vibsim.core.home import called
+from vibsim.core.home import typed
 from vibsim.plan import Plan, ShardJob
 
 if TYPE_CHECKING:
@@ -54,7 +54,7 @@ def made(plan: Plan, results: Path, case: int, word: str) -> tuple[list[int], li
     existing = [level for level in levels if (results / _shard(plan, level, case).path).is_file()]
     if not existing:
         problem = (
-            f"there are no results yet: {called(plan.command_to_run(word))} (looked in {results})"
+            f"there are no results yet: {typed(plan.command_to_run(word))} (looked in {results})"
         )
         raise VibsimError(f"{plan.key}: {problem}")
     return levels, existing

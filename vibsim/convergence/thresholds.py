@@ -75,6 +75,9 @@ LIMIT_ROUNDING = 1e-9  # relative distance within which w dt is at a stability l
 BLOWN_UP = 10.0  # a solution has grown if it is this factor larger than the exact one [convention]
 # Refinement removes growth if one level more leaves less than this part of it, as of an error of order 1. [derived]
 GROWTH_REMOVED = 0.5
+# Factor between the largest speeds of levels above which the force may be infinite somewhere: those of a chaotic motion
+# are alike. [convention]
+UNEVEN_SPEEDS = 2.0
 RESOLVED_DECAY = 1.0  # longest resolved step, over the time constant of a decay [derived]
 ERROR_STAYED = 0.5  # part of the coarsest error above which the finest one stays [derived]
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
+from shlex import quote
 
 _PACKAGE = Path(__file__).resolve().parents[1]
 SHIPPED = _PACKAGE / "shipped"
@@ -25,5 +26,19 @@ def default_results() -> Path:
 
 
 def called(command: str) -> str:
-    """Return a command of vibsim as the user types it, in the checkout with the path of the environment."""
+    """Return a command of vibsim as a page shows it: in the checkout with the path of the environment."""
     return command if is_installed() else f".venv/bin/{command}"
+
+
+def typed(command: str) -> str:
+    """Return a command of vibsim as the user types it in the current folder."""
+    if is_installed() or Path.cwd() == home():
+        return called(command)
+    import shutil  # not needed by jobs
+
+    name, _, arguments = command.partition(" ")
+    program = home() / ".venv" / "bin" / name
+    known = shutil.which(name)
+    if known is not None and Path(known).resolve() == program.resolve():
+        return command
+    return f"{quote(str(program))} {arguments}"

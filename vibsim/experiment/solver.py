@@ -31,6 +31,9 @@ Argument = int | float | str
 OUTPUTS = (PLACE, f"{PLACE}.nc", f"{PLACE}.csv")
 """Placeholders of the file that a command writes; the first two are equivalent."""
 
+NO_MODULE = "cannot be found: no installed package and no module beside the file has this name"
+"""The rule for a module of a function of the user."""
+
 
 class SolverSpec(Section):
     """How a level is computed."""

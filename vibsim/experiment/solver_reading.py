@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from vibsim.core.errors import nearest
+from vibsim.core.modules import find
 from vibsim.core.signatures import misfit_of, signature_of
 from vibsim.experiment.collection import collection_of
 from vibsim.experiment.data import Sweep
@@ -31,7 +32,13 @@ from vibsim.experiment.schema.solver import (
     SolverDocument,
 )
 from vibsim.experiment.schema.sweep import swept_values
-from vibsim.experiment.solver import OUTPUTS, SolverExperiment, SolverSpec, placeholders
+from vibsim.experiment.solver import (
+    NO_MODULE,
+    OUTPUTS,
+    SolverExperiment,
+    SolverSpec,
+    placeholders,
+)
 from vibsim.experiment.tables.file import ENDINGS
 from vibsim.experiment.validation import read_document
 from vibsim.experiment.yaml.parse import Path_, Source, read
@@ -360,8 +367,12 @@ def _check_function(experiment: SolverExperiment, report: Report) -> None:
     file = experiment.folder.joinpath(*module.split(".")).with_suffix(".py")
     try:
         tree = ast.parse(file.read_bytes())
-    except (OSError, SyntaxError, ValueError):
-        return  # an installed module, or an error that Python reports with its line
+    except OSError:
+        if not _is_found(module, experiment.folder.absolute()):
+            report.add((SOLVER, "python"), NO_MODULE, value=experiment.solver.text)
+        return
+    except (SyntaxError, ValueError):
+        return  # Python reports it with its line
     nodes = list(ast.walk(tree))
     functions = [node.name for node in nodes if isinstance(node, ast.FunctionDef | ast.ClassDef)]
     assigned = {node.id for node in nodes if isinstance(node, ast.Name)}
@@ -378,6 +389,14 @@ def _check_function(experiment: SolverExperiment, report: Report) -> None:
     # a decorator may change the arguments
     if defined and isinstance(last := defined[-1], ast.FunctionDef) and not last.decorator_list:
         _check_arguments(last, experiment, report)
+
+
+def _is_found(module: str, folder: Path) -> bool:
+    """Tell whether a module without a file in the folder is installed, or a package there."""
+    top, *inner = module.split(".")
+    spec = find(module, folder)
+    is_here = spec is not None and str(folder / top) in (spec.submodule_search_locations or ())
+    return spec is not None and not (is_here and not folder.joinpath(top, *inner).is_dir())
 
 
 def _check_arguments(node: ast.FunctionDef, experiment: SolverExperiment, report: Report) -> None:

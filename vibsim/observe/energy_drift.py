@@ -152,6 +152,7 @@ def _of_steps(block: MemberBlock, level: int) -> Floats:
     return np.where(plain[:, None], np.minimum(size, th.MOST_ROUNDED), 0.0) / ABOVE_ROUND_OFF
 
 
+@np.errstate(divide="ignore", invalid="ignore", over="ignore")
 def drift_of(
     running: Floats,
     ratio: Floats,
@@ -175,17 +176,16 @@ def drift_of(
     """
     samples = running.shape[-1] - 1
     end = np.fmax.reduce(running, axis=-1)
-    with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
-        change = on_arrays.log(np.abs(ratio))
-        fall, k_log = _power(np.abs(change))
-        last, left = change[..., -1], np.abs(ratio * energy[..., None])[..., -1]
-        means, so_far = _means(running), _range(deviation)
-        of_range = _means(so_far)
-        (rise, k), (range_rise, range_k) = _rise(means), _rise(of_range)
-        # the last rise of an oscillation with several frequencies may be a stair
-        moves = _shifts_the_range(deviation)
-        stops = (_last_rise(running) < th.STILL_WIDENS * rise) | ~moves
-        range_stops = (_last_rise(so_far) < th.STILL_WIDENS * range_rise) | ~moves
+    change = on_arrays.log(np.abs(ratio))
+    fall, k_log = _power(np.abs(change))
+    last, left = change[..., -1], np.abs(ratio * energy[..., None])[..., -1]
+    means, so_far = _means(running), _range(deviation)
+    of_range = _means(so_far)
+    (rise, k), (range_rise, range_k) = _rise(means), _rise(of_range)
+    # the last rise of an oscillation with several frequencies may be a stair
+    moves = _shifts_the_range(deviation)
+    stops = (_last_rise(running) < th.STILL_WIDENS * rise) | ~moves
+    range_stops = (_last_rise(so_far) < th.STILL_WIDENS * range_rise) | ~moves
     gone = (left < th.SMALLEST_NORMAL) & (np.abs(energy) > th.SMALLEST_NORMAL)
     size = np.where(np.isfinite(end) & (end > 0), end, 1.0)
     allowed = np.broadcast_to(ABOVE_ROUND_OFF * floor, end.shape)
@@ -259,8 +259,7 @@ def _shifts_the_range(deviation: Floats) -> Flags:
     if n < th.LEAST_SAMPLES:
         return np.ones(deviation.shape[:-1], dtype=bool)
     third, last = deviation[..., n // 2 : 3 * n // 4], deviation[..., 3 * n // 4 :]
-    with np.errstate(over="ignore", invalid="ignore"):
-        high, low = (f(last, axis=-1) - f(third, axis=-1) for f in (np.max, np.min))
+    high, low = (f(last, axis=-1) - f(third, axis=-1) for f in (np.max, np.min))
     slower, faster = (f(np.abs(high), np.abs(low)) for f in (np.minimum, np.maximum))
     return np.asarray((np.sign(high) == np.sign(low)) & (slower >= th.BOTH_MOVE * faster))
 
@@ -303,5 +302,4 @@ def _rise(means: Floats) -> tuple[Floats, Floats]:
     """Return m1 - m2 and k from `_means`."""
     third, second, first = (means[..., i] for i in range(3))
     rise = np.asarray(first - second)
-    with np.errstate(divide="ignore", invalid="ignore"):
-        return rise, on_arrays.log2(rise / (second - third))
+    return rise, on_arrays.log2(rise / (second - third))

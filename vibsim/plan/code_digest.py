@@ -22,7 +22,6 @@ import importlib
 import importlib.util
 import json
 import os
-import sys
 from collections.abc import Iterable, Iterator, Mapping
 from contextlib import suppress
 from functools import cache
@@ -31,6 +30,7 @@ from pathlib import Path
 import vibsim
 from vibsim.core import private_cache, registry
 from vibsim.core.errors import VibsimError
+from vibsim.core.modules import find
 
 PACKAGE = Path(vibsim.__file__).parent
 _LISTS = ("vibsim.models", "vibsim.schemes")
@@ -118,16 +118,7 @@ def of_module(name: str, folder: Path) -> str:
 
     The module is searched for on `sys.path` and then in `folder`, but not imported.
     """
-    top = name.partition(".")[0]
-    old_path = sys.path.copy()
-    try:
-        sys.path.append(str(folder))
-        importlib.invalidate_caches()
-        spec = importlib.util.find_spec(top)
-    except (ImportError, ValueError):
-        spec = None
-    finally:
-        sys.path[:] = old_path
+    spec = find(name, folder)
     if spec is None:
         return ""
     digest = hashlib.sha256(f"{name}\n".encode())

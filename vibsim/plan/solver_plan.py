@@ -14,7 +14,7 @@ from typing import Any
 
 from vibsim.core import regular_files
 from vibsim.core.vocabulary import FORMAT
-from vibsim.experiment.solver import SolverExperiment
+from vibsim.experiment.solver import NO_MODULE, SolverExperiment
 from vibsim.plan import code_digest
 from vibsim.plan.build import job_digest, level_digests
 from vibsim.plan.digests import analysed, digest_of, solved
@@ -122,6 +122,5 @@ def _code(experiment: SolverExperiment, module: str) -> str:
     """Return the digest of the package that contains a module, without importing it."""
     digest = code_digest.of_module(module, experiment.folder)
     if not digest:
-        rule = "cannot be found: no installed package and no module beside the file has this name"
-        raise experiment.refused("solver.python", module.partition(".")[0], rule)
+        raise experiment.refused("solver.python", module, NO_MODULE)
     return digest

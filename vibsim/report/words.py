@@ -278,6 +278,8 @@ def in_style_of(value: float, text: str) -> str:
     if "·" in printed(text) and value != 0.0:
         head, exponent = f"{value:.{places + MORE_DIGITS}e}".split("e")
         return f"{head}·{power(int(exponent))}".replace("-", "−", 1)
+    if abs(value) >= 10.0 ** max(MOST_DIGITS, len(mantissa)):
+        return number(value)
     return f"{value:.{places + MORE_DIGITS}f}".replace("-", "−")
 
 

@@ -183,6 +183,7 @@ def test_a_small_error_passes_and_a_large_one_fails_with_the_level_that_reaches_
     # a factor of 10 is two levels of second order
     assert facts(a_little_less)["level_needed"] == 11
     assert "Add levels 10 and 11" in a_little_less.advice
+    assert "which is probably enough by the measured order, or change `rel" in a_little_less.advice
     more = {**PENDULUM, "levels": [6, 7, 8, 9, 10, 11]}
     assert [v.status for v in asked(more, a_little, with_exact=with_exact)] == ["PASS"]
 

@@ -125,6 +125,19 @@ def test_advice_on_stability_points_the_right_way() -> None:
     assert "finer" in unstable.advice
 
 
+@pytest.mark.parametrize("damping", [{}, {"damping": {"linear": 0.1}}])
+def test_a_limit_is_said_to_be_that_of_the_undamped_motion(damping: dict[str, Any]) -> None:
+    model = {"kind": "oscillator", "spring": "40*u", **damping}
+    checks = [{"stable": True}, {"converges": "u"}]
+    stable, order = spring(
+        ["rk4"], *checks, model=model, time={"end": 20.0, "base_steps": 40}
+    ).verdicts
+    assert ("2.82843 for the undamped motion)" in stable.advice) == bool(damping)
+    assert ("of scheme rk4 for the undamped motion. Level" in order.text) == bool(damping)
+    assert "w dt within the limit 2.82843" in stable.advice
+    assert "beyond the limit 2.82843 of scheme rk4" in order.text
+
+
 @pytest.mark.slow
 def test_a_tolerance_that_is_advised_suffices() -> None:
     check = {"equal": ["central", "exact"], "quantity": "u"}
@@ -205,6 +218,58 @@ def test_an_energy_that_decays_is_said_to_decay() -> None:
     for scheme, word in (("backward_euler", "decays"), ("forward_euler", "grows")):
         text = spring([scheme], check).verdicts[0].text
         assert f"{word} exponentially" in text
+
+
+@pytest.mark.parametrize("scheme", ["newmark", "backward_euler", "bdf2"])
+def test_levels_that_pass_through_a_pole_say_nothing_about_stability(scheme: str) -> None:
+    """``u = 1/(1 - t)`` is infinite at t = 1, and implicit steps go on behind it."""
+    content = {
+        "model": {"kind": "system", "equation": "u'' - 2*u**3 = 0"},
+        "initial": {"u": 1.0, "v": 1.0},
+        "time": {"end": 2.0, "base_steps": 3},
+    }
+    levels = (4, 5, 6, 7)
+    checks = {"stable": True}, {"stable": False}
+    for found in spring([scheme], *checks, levels=levels, **content).verdicts:
+        assert (found.status, found.reason) == ("INCONCLUSIVE", "pre_asymptotic")
+        assert "as where a force becomes infinite" in found.text
+        assert "time: end" in found.advice
+    content["time"] = {"end": 0.9, "base_steps": 3}
+    (found,) = spring([scheme], checks[0], levels=levels, **content).verdicts
+    assert (found.status, found.reason) == ("PASS", "match")
+
+
+@pytest.mark.parametrize(
+    "content",
+    [
+        # chaos: levels differ by whole turns, and their speeds are alike
+        {
+            "model": {
+                "kind": "system",
+                "equation": "q'' + 0.5*q' + sin(q) - 1.15*cos(2*t/3) = 0",
+            },
+            "initial": {"q": 1.0},
+            "time": {"end": 200.0, "base_steps": 100},
+        },
+        # steps that are too long for the motion keep a speed of their own
+        {
+            "model": {"kind": "system", "equation": "u'' + 1e4*u + u**3 = 0"},
+            "initial": {"u": 1.0},
+            "time": {"end": 10.0, "base_steps": 10},
+        },
+        # the growth of a scheme, which falls with the step
+        {
+            "model": {"kind": "system", "equation": "u'' + u + 0.1*u**2 = 0"},
+            "initial": {"u": 0.1},
+            "time": {"end": 20.0, "base_steps": 100},
+        },
+    ],
+    ids=["chaos", "coarse", "growth"],
+)
+def test_levels_whose_speeds_differ_for_another_cause_are_stable(content: dict[str, Any]) -> None:
+    scheme = "forward_euler" if content["initial"].get("u") == 0.1 else "backward_euler"
+    (found,) = spring([scheme], {"stable": True}, levels=(0, 1, 2), **content).verdicts
+    assert (found.status, found.reason) == ("PASS", "match")
 
 
 def test_growth_that_nothing_shows_to_vanish_is_an_instability() -> None:

@@ -53,8 +53,8 @@ def test_units(check, unit):
     assert unit_of(experiment, record, experiment.checks[0]) == unit
     (verdict,) = verdicts(experiment, record)
     number = f" is {verdict.results[0].value:.10g}"
-    told = f"{number} {unit}" if unit else number
-    assert f"{told}; it is above -99." in verdict.text
+    told = f"{number} {unit}; it is above -99 {unit}." if unit else f"{number}; it is above -99."
+    assert told in verdict.text
     # UDUNITS has no roots
     in_file = unit.removesuffix(" sqrt(s)") or "1"
     assert record.variable("check_check_1_value").attrs["units"] == in_file

@@ -417,3 +417,44 @@ def test_a_pulse_of_the_load_of_a_structure_that_no_level_sees_is_known() -> Non
     (verdict,) = judged(made)
     assert (verdict.status, verdict.reason) == ("INCONCLUSIVE", "pre_asymptotic"), verdict.text
     assert "pulse" in verdict.text
+
+
+@pytest.mark.parametrize(
+    ("force", "place"),
+    [
+        ("abs(t - 1)**1.5", "at a grid point (t - 1 passes zero at t = 1)"),
+        ("max(t - 1, 0)**1.5 - u", "at a grid point (t - 1 passes zero at t = 1)"),
+        # the start is a grid point of every level
+        ("abs(u - 0.25)**1.5", "at a grid point (u - 0.25 passes zero at t = 0)"),
+        ("abs(0.25 - u)**1.5", "at a grid point (0.25 - u passes zero at t = 0)"),
+        # no formula of this power goes on behind the corner
+        ("cos(3*t) - abs(u - 0.75)**1.5", "within a step (u - 0.75 passes zero at t = "),
+        (
+            "sin(t) + sign(t - 1.3)*abs(t - 1.3)**1.5",
+            "within a step (t - 1.3 passes zero at t = 1.3)",
+        ),
+    ],
+)
+def test_a_broken_power_counts_within_steps_and_at_grid_points(force: str, place: str) -> None:
+    model = {"kind": "system", "coordinates": {"u": {"acceleration": force}}}
+    times = {"initial": {"u": 0.25, "v": 1.0}, "time": {"end": 2.0, "base_steps": 4}}
+    made = experiment(["rk4"], model=model, levels=[2, 3, 4, 5, 6], **times)
+    (verdict,) = judged(made)
+    assert (verdict.status, verdict.reason) == ("INCONCLUSIVE", "non_smooth"), verdict.text
+    assert "the force changes like the power 1.5 of the distance" in verdict.text
+    assert place in verdict.text
+    assert "Expect order 2.5" in verdict.text
+    assert ("before t = " in verdict.advice) == ("t = 0)" not in verdict.text)
+    if "grid point" in place:
+        assert "Set `order: 2.5`" in verdict.advice
+
+
+@pytest.mark.parametrize(
+    "force", ["abs(t - 1)**3", "abs(t - 1)**1.5*abs(t - 1)**0.5 - u", "cos(abs(t - 1.3))"]
+)
+def test_a_force_that_is_smooth_on_both_sides_of_a_grid_point_keeps_its_order(force: str) -> None:
+    model = {"kind": "system", "coordinates": {"u": {"acceleration": force}}}
+    times = {"initial": {"u": 0.25, "v": 1.0}, "time": {"end": 2.0, "base_steps": 4}}
+    made = experiment(["rk4"], model=model, levels=[2, 3, 4, 5, 6], **times)
+    (verdict,) = judged(made)
+    assert (verdict.status, verdict.reason) == ("PASS", "asymptotic"), verdict.text

@@ -291,3 +291,15 @@ def test_round_off_is_known_without_small_oscillations(
     )
     found = verdicts(made, analyse(made, [simulate(made, level) for level in made.levels]))
     assert tuple(row.status for row in found) == verdicts_of
+
+
+@pytest.mark.filterwarnings("error")
+@pytest.mark.parametrize("end", [np.inf, np.nan])
+def test_an_energy_that_is_not_finite_at_the_end_is_unclear(end: float) -> None:
+    running, one = np.array([0.0, *np.full(400, 1.0), *np.full(112, end)]), np.ones((1, 1))
+    wave = running * np.sign(WAVE)
+    found = drift_of(
+        *(running[None, None], 1.0 + wave[None, None], one, 1e-15 * one, np.array([PERIODS])),
+        wave[None, None],
+    )
+    assert DRIFTS[int(found.kind[0, 0])] == "unclear"

@@ -13,7 +13,7 @@ from vibsim.cli.jobs.common import chosen_results
 from vibsim.cli.level_member import are_outdated, summary_of
 from vibsim.cli.setting_changes import Change, differences
 from vibsim.cli.terminal import clean, painted
-from vibsim.core.home import called
+from vibsim.core.home import typed
 from vibsim.plan.digests import analysed
 from vibsim.store import read_json
 
@@ -51,7 +51,7 @@ def diff(options: Namespace) -> int:
             print(painted(name, "bold"))
             print(*(f"  {change}" for change in changes), sep="\n")
     for word, side in missing:
-        print(f"{word}: there are no verdicts of these settings yet: {called(side.command)}")
+        print(f"{word}: there are no verdicts of these settings yet: {typed(side.command)}")
     if any(parts.values()):
         return 1
     if not missing:

@@ -12,7 +12,7 @@ from decimal import Decimal, InvalidOperation
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NoReturn
 
-from vibsim.cli.jobs.common import check_folder
+from vibsim.cli.jobs.common import check_to_write
 from vibsim.core.errors import Fault, InputError, nearest
 from vibsim.core.vocabulary import FORMAT, worst
 from vibsim.solver import level_tables
@@ -29,7 +29,7 @@ def judge(options: Namespace) -> int:
     if options.order is not None and options.at_least is not None:
         _refuse("--at-least", f"{options.at_least:g}", "must not be given together with --order")
     if options.report:
-        check_folder("--report", options.report)
+        check_to_write("--report", options.report)
     studies = _studies(options)
     exact = _exact(options.exact, [study.quantity for study in studies])
     verdicts = [_judged(study, options, exact.get(study.quantity)) for study in studies]

@@ -11,10 +11,10 @@ from typing import TYPE_CHECKING
 
 from vibsim.cli import level_member
 from vibsim.cli.chosen_plans import one_plan_of
-from vibsim.cli.jobs.common import check_folder, chosen_results, refusal
+from vibsim.cli.jobs.common import check_to_write, chosen_results, refusal
 from vibsim.cli.level_member import chosen
 from vibsim.core.errors import VibsimError
-from vibsim.core.home import called
+from vibsim.core.home import typed
 from vibsim.core.set_option import command_to_run
 from vibsim.plan import Plan
 from vibsim.store import write_bytes
@@ -113,7 +113,7 @@ def _film(plan: Plan, options: Namespace, form: str) -> Film:
     for level in options.level or ():
         level_member.check_level(level, levels)
         if level not in made:
-            problem = f"level {level} is not made yet: {called(command_to_run(options.experiment))}"
+            problem = f"level {level} is not made yet: {typed(command_to_run(options.experiment))}"
             raise VibsimError(f"{plan.key}: {problem}")
     wanted_levels = options.level or [made[-1]]
 
@@ -125,7 +125,7 @@ def _film(plan: Plan, options: Namespace, form: str) -> Film:
     record = records[wanted_levels[0]]
     names = level_member.series(record)
     if not names:
-        hint = f"run one member alone: {called(command_to_run(f'{options.experiment}@{case}'))}"
+        hint = f"run one member alone: {typed(command_to_run(f'{options.experiment}@{case}'))}"
         raise VibsimError(f"{plan.key}: there are no series over time to be shown; {hint}")
     schemes = [chosen("--scheme", s, record.schemes) for s in options.scheme or [None]]
     position = plan.experiment.model.definition.position
@@ -171,7 +171,7 @@ def _check_times(options: Namespace, runs: Sequence[Run]) -> None:
 
 def _check_folder(folder: Path, count: int) -> None:
     """Refuse a folder with old frames that the new ones would not overwrite."""
-    check_folder("--frames-to", folder)
+    check_to_write("--frames-to", folder)
     frame = re.compile(r"frame_(\d{4,})\.png")
     numbers = (frame.fullmatch(path.name) for path in folder.glob("frame_*.png"))
     if any(number is not None and int(number[1]) >= count for number in numbers):

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING
 
 from vibsim.cli.jobs.common import refusal
 from vibsim.cli.list_entry import COORDINATES, model_named, needed, parameter_text, unit_text
-from vibsim.core.home import called, home
+from vibsim.core.home import home, typed
 from vibsim.experiment.collection import ENDINGS
 from vibsim.store import write_bytes, write_text
 
@@ -66,7 +66,7 @@ def new(options: Namespace) -> int:
         write_bytes(file.parent / name, content)
         print(f"wrote {file.parent / name}")
     word = quote(str(file))
-    print(f"check it: {called(f'vibsim check {word}')}\nrun it:   {called(f'vibsim run {word}')}")
+    print(f"check it: {typed(f'vibsim check {word}')}\nrun it:   {typed(f'vibsim run {word}')}")
     return 0
 
 

@@ -10,7 +10,7 @@ from vibsim.cli.chosen_plans import one_plan_of
 from vibsim.cli.jobs.common import chosen_results
 from vibsim.cli.level_member import OUTDATED, are_outdated, summary_of
 from vibsim.core.errors import VibsimError
-from vibsim.core.home import called
+from vibsim.core.home import typed
 
 
 def open_(options: Namespace) -> int:
@@ -23,7 +23,7 @@ def open_(options: Namespace) -> int:
     plan = None if word is None else one_plan_of(word)
     page = results / ("index.html" if plan is None else plan.page)
     if not page.is_file():
-        command = called("vibsim run" if plan is None else plan.command_to_run(str(word)))
+        command = typed("vibsim run" if plan is None else plan.command_to_run(str(word)))
         raise VibsimError(f"{page}: there is no report yet: {command}")
     if plan is not None:
         summary = summary_of(plan, results)

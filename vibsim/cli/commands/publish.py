@@ -23,7 +23,7 @@ from vibsim.cli.commands import verify
 from vibsim.cli.jobs.common import one_plan, read_all, refusal
 from vibsim.core import regular_files
 from vibsim.core.errors import VibsimError
-from vibsim.core.home import called
+from vibsim.core.home import typed
 from vibsim.plan import Plan
 from vibsim.store.reading import read_provenance
 
@@ -63,7 +63,7 @@ def _check(plan: Plan, options: Namespace, results: Path) -> None:
     _, problems = verify.compare(results, plan.key)
     if problems:
         text = "\n".join(f"{path}: {problem}" for path, problem in problems.items())
-        command = called(plan.command_to_run(str(plan.file)))
+        command = typed(plan.command_to_run(str(plan.file)))
         raise VibsimError(f"{text}\nonly whole results are published: {command}")
     current: dict[str, Callable[[Path], Any]] = {
         shard.path: partial(store.check, digest=shard.digest) for shard in plan.shards

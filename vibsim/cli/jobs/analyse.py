@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 from vibsim.cli.jobs.common import (
     COMPARED,
     check_digest,
+    check_to_write,
     on_record,
     one_plan,
     open_levels,
@@ -22,6 +23,8 @@ if TYPE_CHECKING:
 
 def analyse(options: Namespace) -> int:
     """Compare all levels; write ``convergence.nc`` and ``summary.json``."""
+    if options.out is not None:
+        check_to_write("--out", options.out)
     plan, results = one_plan(options)
     check_digest(plan, options.digest, plan.analysis)
     if plan.has_solver:

@@ -6,6 +6,7 @@ digest of every file that it reads; a file that is damaged or from another job i
 
 from __future__ import annotations
 
+import os
 import sys
 from argparse import Namespace
 from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -37,8 +38,11 @@ def chosen_results(options: Namespace) -> Path:
     return folder.absolute()
 
 
-def check_folder(option: str, folder: Path) -> None:
-    """Refuse a path that is not a folder and cannot become one: a file, or a path below a file."""
+def check_folder(option: str, folder: Path) -> Path:
+    """Refuse a path that is not a folder and cannot become one: a file, or a path below a file.
+
+    Return the nearest folder at or above it that exists.
+    """
     try:
         existing = next(path for path in (folder, *folder.absolute().parents) if path.exists())
         is_folder = existing.is_dir()
@@ -49,6 +53,15 @@ def check_folder(option: str, folder: Path) -> None:
     if not is_folder:
         this = "this" if existing == folder else existing
         raise refusal(option, folder, f"must be a folder, {this} is a file")
+    return existing
+
+
+def check_to_write(option: str, folder: Path) -> None:
+    """Refuse a path that is no folder to write to; the error comes before the work."""
+    existing = check_folder(option, folder)
+    if not os.access(existing, os.W_OK | os.X_OK):
+        this = "this folder" if existing == folder else existing
+        raise refusal(option, folder, f"must be a folder to write to, {this} is write-protected")
 
 
 def one_plan(options: Namespace) -> tuple[Plan, Path]:

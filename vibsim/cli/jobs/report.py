@@ -11,6 +11,7 @@ from typing import Any
 from vibsim.cli import made_files
 from vibsim.cli.jobs.common import (
     check_digest,
+    check_to_write,
     chosen_results,
     on_record,
     one_plan,
@@ -25,6 +26,8 @@ from vibsim.experiment import citation
 
 def report(options: Namespace) -> int:
     """Write the report of one experiment, or the index of all results."""
+    if options.out is not None:
+        check_to_write("--out", options.out)
     if options.experiment is None:
         return _index(options)
     formats = _formats(options)

@@ -29,13 +29,14 @@ def number(value: float | None, digits: int) -> str:
 
 
 def digits_of_values(values: Iterable[float | None]) -> int:
-    """Return the number of significant digits, at least 8, that shows the smallest difference of successive values."""
+    """Return the number of significant digits, at least 8, that shows the smallest difference of successive values.
+
+    It is relative to these two values: others may have blown up.
+    """
     known = [value for value in values if value is not None]
-    steps = [abs(a - b) for a, b in pairwise(known) if a != b]
-    if not steps:
-        return 8
-    digits = 2 + math.log10(max(map(abs, known))) - math.log10(min(steps))
-    return math.ceil(min(max(8, digits), 17))
+    pairs = [(max(abs(a), abs(b)), abs(a - b)) for a, b in pairwise(known) if a != b]
+    digits = [2 + math.log10(size) - math.log10(step) for size, step in pairs]
+    return math.ceil(min(max([8.0, *digits]), 17))
 
 
 def at_most(bound: float) -> str:

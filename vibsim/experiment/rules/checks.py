@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from itertools import count
 from typing import Any
@@ -190,10 +191,23 @@ def _check_value_check(check: ValueCheck, scope: Scope) -> None:
     if row is None:
         place.check_scheme_and_case(check.at)
         return
+    if row.is_angle and check.take in OF_THE_SAME_KIND:
+        _check_angle(check, scope)
     check_quantity_of(row, check.quantity, check.at.level == "best", scope)
     if check.quantity is not None and check.at.scheme is not None:
         check_velocities(check.quantity, [(check.at.scheme, place.at("scheme"))])
     place.check_place(check.at, row)
+
+
+def _check_angle(check: ValueCheck, scope: Scope) -> None:
+    """Refuse bounds that every angle meets, or none."""
+    for key, bound in (("below", check.below), ("above", check.above)):
+        if bound is not None and abs(bound) >= math.pi:
+            rule = "must be between -pi and pi, where every phase lies, or it decides nothing"
+            scope.at(key).refuse(rule, "phases are in radians")
+    if check.allowed >= math.pi:
+        rule = "allows every phase, because two of them differ by at most pi"
+        scope.at("atol" if check.atol else "rtol").refuse(rule, "phases are in radians")
 
 
 def _check_reduction(check: ValueCheck, scope: Scope) -> None:

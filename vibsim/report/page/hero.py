@@ -79,7 +79,7 @@ def _traps(summary: Mapping[str, Any], lead: CheckedLadder) -> Iterator[str]:
         order = words.fact(result, "order") if has_order else None
         if words.badge(check) == words.TRAP and check is not lead.entry and order is not None:
             scheme, letter = result["scheme"], words.title(check["quantity"])
-            yield f"As the trap expects, {letter} has order {words.number(order, 'order')} with scheme {scheme}."
+            yield f"As the trap expects, {letter} by {scheme} has order {words.number(order, 'order')}."
 
 
 def _facts(record: Results) -> Iterator[str]:

@@ -36,7 +36,7 @@ ON_ORDER = {
     "mismatch": "{What} does not behave as the check expects",
     "wrong_limit": "{What} approaches a wrong solution",
     "unstable": "The run is unstable, so {what} shows no order",
-    "non_finite": "The run breaks down before its end",
+    "non_finite": "The run{by} breaks down before its end",
     "pre_asymptotic": "The levels are too coarse to show the order of {what}",
     "round_off": "The differences of {what} are round-off, so no order can be measured",
     "oscillating": "The error of {what} changes its sign from level to level",
@@ -57,25 +57,30 @@ MATCHED = {
 MISSED = {
     "value": "{Subject} is not as expected",
     "accurate": "{What} is not as accurate as asked",
-    "stable": "The amplitude {grows}, against what is asked",
-    "conserves": "Not as asked: that the energy {drift}",
+    "stable": "The amplitude{by} {grows}, against what is asked",
+    "conserves": "Not as asked: that the energy{by} {drift}",
     "equal": "{What} by {first} differs from {second}",
-    "tolerance": "The error bound is beyond the tolerance",
+    "tolerance": "The error bound{by} is beyond the tolerance",
 }
 """Kind of a failed check to the title of a page on it."""
 OPEN = {
     "value": "It is undecided whether {subject} is as expected",
     "accurate": "It is undecided whether {what} is as accurate as asked",
-    "stable": "It is undecided whether the run is stable",
-    "conserves": "It is undecided how the energy behaves",
+    "stable": "It is undecided whether the run{by} is stable",
+    "conserves": "It is undecided how the energy{by} behaves",
     "equal": "It is undecided whether {what} by {first} equals {second}",
     "tolerance": "It is undecided whether the tolerance is reached",
 }
 """Kind of an undecided check to the title of a page on it."""
+IN_NUMBERS = {
+    "value": "It is {found}, not {asked}.",
+    "accurate": "The error is {found}; {asked} is asked for.",
+    "equal": "They are {found}.",
+}
+"""Kind of a failed check to its numbers, under a title that says what failed."""
 GROWN = 2.0
 """Ratio of the finest error to the smallest one from which a page says that refinement does harm."""
 NO_CHECK = "The motion was computed, and nothing was asked of it"
-BROKE_DOWN = "The run breaks down before its end"
 CLAIMS = {
     ("PASS", False): "",
     ("PASS", True): "Shown to be false: ",
@@ -126,7 +131,7 @@ def _share_of_runs(lead: CheckedLadder) -> str:
     if not 0 < count < lead.total:
         return ""
     if count == 1 and not lead.record.swept:
-        return f", with {lead.result['scheme']}"
+        return f",{_by(lead)}" if _claim_title(lead) else ""
     noun = "members" if len(lead.record.schemes) == 1 else "runs"
     noun = noun if lead.record.swept else "schemes"
     part, whole = (words.number(n, "integer") for n in (count, lead.total))
@@ -176,7 +181,7 @@ def _check_title(lead: CheckedLadder) -> str:
             word = "asymptotic"
         return ON_ORDER.get(word, ON_ORDER["mismatch"]).format_map(filled)
     if reason == "non_finite":
-        return BROKE_DOWN
+        return ON_ORDER["non_finite"].format_map(filled)
     if _is_trap_of_a_number(lead):
         # the outcome says more than that it was expected
         status = lead.result.get("status", status)
@@ -186,11 +191,12 @@ def _check_title(lead: CheckedLadder) -> str:
 
 def _phrases(lead: CheckedLadder) -> dict[str, str]:
     """Return the words that fill the template of a title."""
-    measured, what = lead.measured, _in_words(lead.record.model, lead.quantity)
+    measured, by = lead.measured, _by(lead)
+    what = f"{_in_words(lead.record.model, lead.quantity)}{by}"
     order, expected = lead.facts.get("order"), lead.facts.get("promised")
     judged = lead.schemes
     filled = {
-        "what": what, "What": _capitalized(what), "everywhere": _everywhere(lead),
+        "what": what, "What": _capitalized(what), "by": by, "everywhere": _everywhere(lead),
         "converges": "tends to zero" if plain_name(lead.quantity) == "energy_deviation" else "converges",
         "at": _at(expected, order), **_contrast(order, expected),
         "Schemes": f"Scheme {judged[0]}" if len(judged) == 1 else "The schemes",
@@ -200,7 +206,7 @@ def _phrases(lead: CheckedLadder) -> dict[str, str]:
         return filled
     match measured.kind:
         case "value":
-            subject = assertions.subject(measured, lead.record)
+            subject = f"{assertions.subject(measured, lead.record)}{by}"
             filled |= {"subject": subject, "Subject": _capitalized(words.PAGE.opening(subject))}
         case "equal":
             second = assertions.SOLUTIONS.get(measured.second, f"that by {measured.second}")
@@ -255,21 +261,29 @@ def short(model: Model, quantity: str) -> str:
     return _in_words(model, quantity) if is_phrase else words.symbol(quantity)
 
 
+def _by(lead: CheckedLadder) -> str:
+    """Name the scheme of a finding that is about one of several; empty where the subject names it, or for all."""
+    assert lead.entry is not None
+    check, schemes = lead.measured, lead.schemes
+    if lead.kind == "equal" or (check is not None and check.kind == "value" and check.at.scheme):
+        return ""
+    if lead.status != "PASS" and lead.entry["counts"][lead.status] == 1 and not lead.record.swept:
+        schemes = (lead.result["scheme"],)
+    return f" by {schemes[0]}" if len(schemes) == 1 < len(lead.record.schemes) else ""
+
+
 def _everywhere(lead: CheckedLadder) -> str:
     """Say for which members and schemes the finding holds; empty for one result of the only scheme."""
     total, schemes, members = lead.total, lead.record.schemes, lead.record.count
-    is_on_error = lead.kind in ("converges", "accurate")
-    is_named = is_on_error and len(lead.schemes) == 1 < len(schemes)
-    by = f" with scheme {lead.schemes[0]}" if is_named else ""
-    if total < 2 and (members < 2 or not is_on_error):
-        return by
+    if total < 2 and (members < 2 or lead.kind not in ("converges", "accurate")):
+        return ""
     if lead.record.swept:
         count = {1: "the", 2: "both"}.get(total, f"all {words.number(total, 'integer')}")
         noun = "runs" if total > members else "members" if total > 1 else "member"
         values = assertions.swept_values(lead.measured, lead.record) if lead.measured else []
         subset = f"with {words.swept(', '.join(values))}" if values else "asked about"
         of = f" {subset}, of {words.number(members, 'integer')} in all" * (total < members)
-        return f" in {count} {noun}{of}{by}"
+        return f" in {count} {noun}{of}"
     if total == len(schemes) == 2:
         return " with both schemes"
     count = NUMERALS.get(len(schemes), str(len(schemes)))
@@ -295,7 +309,7 @@ def _capitalized(text: str) -> str:
 def of_ladder(verdict: LadderVerdict) -> str:
     """Return the finding on a ladder of another solver in one line."""
     filled = {
-        "what": verdict.quantity, "What": verdict.quantity, "everywhere": "", "converges": "converges",
+        "what": verdict.quantity, "What": verdict.quantity, "by": "", "everywhere": "", "converges": "converges",
         "at": _at(verdict.expected, verdict.order), **_contrast(verdict.order, verdict.expected),
     }  # fmt: skip
     if verdict.expected is None and verdict.at_least is not None:
@@ -339,9 +353,23 @@ def paragraph(lead: CheckedLadder) -> str:
     if word == "mismatch" and lead.kind in KINDS:
         # what was found says more than that it is not as expected
         wording = Wording(record.experiment, record, lead.asserted, words.PAGE)
-        return words.swept(wording.sentence(Result.of(lead.result)))
+        result, template = Result.of(lead.result), IN_NUMBERS.get(lead.kind)
+        if template is None or getattr(lead.measured, "take", None) is not None:
+            return words.swept(wording.sentence(result))
+        return words.swept(template.format(found=wording.brief(result), asked=_asked(lead)))
     meaning = explained(lead, word).meaning
     return meaning + (_growing_error(lead) if word == "round_off" else "")
+
+
+def _asked(lead: CheckedLadder) -> str:
+    """Say what is asked of a number, with its unit, or of an error."""
+    check = lead.measured
+    if check is not None and check.kind == "accurate":
+        return words.PAGE.number(check.accuracy)
+    if check is None or check.kind != "value":
+        return ""
+    unit = lead.record.unit_of_number(check)
+    return assertions.wanted(lead.record.experiment, check, unit=unit)
 
 
 def _growing_error(lead: CheckedLadder) -> str:

@@ -124,6 +124,11 @@ _BY_KIND = {
     ),
 }
 
+_POLE = Reason(
+    "The levels do not follow one motion. Their largest speeds differ, as where a force becomes infinite.",
+    "An interval that ends before the force becomes infinite, or finer levels if the step is too coarse.",
+)
+
 _OF_PROMISE = {
     "order_low": Reason(
         "The error shrinks with the order that the scheme promises here, which is lower than the expected one.",
@@ -166,6 +171,8 @@ def reason(
         return _OF_PROMISE[word]
     if kind == BY_TOLERANCE and word in _OF_TOLERANCE:
         return _OF_TOLERANCE[word]
+    if word == "pre_asymptotic" and kind == "stable":
+        return _POLE
     if word == "match" and kind in _BY_KIND:
         return _BY_KIND[kind]
     if word == "match" and kind != "converges":
