@@ -144,15 +144,28 @@ def _is_contradicted(ladder: Ladder, p: Posterior, question: Question) -> Flags:
     """Say where levels finer than the most probable window differ too much to be noise.
 
     That is by more than the last difference in the window, grown as fast as round-off can, and by more than the
-    predicted noise. Then either a finer level or the levels of the window are wrong.
+    predicted noise; or their true errors exceed that of the finest level in the window in this way. Then either a finer
+    level or the levels of the window are wrong.
     """
     sizes = np.sqrt(np.diagonal(ladder.gram, axis1=1, axis2=2))[:, : len(ladder.h) - 1]
-    last = likely_window(p)[1]
+    last, n = likely_window(p)[1], len(ladder.h)
     last_difference = np.take_along_axis(sizes, last[:, None] - 1, axis=1)
-    is_finer = np.arange(sizes.shape[1]) >= last[:, None]
-    refinement = np.where(
-        is_finer, ladder.h[np.minimum(last + 1, len(ladder.h) - 1)][:, None] / ladder.h[1:], 1.0
-    )
-    largest = last_difference * on_arrays.power(refinement, GROWTHS[-1])
+    first_finer = np.minimum(last + 1, n - 1)[:, None]
+    is_finer = np.arange(1, n) > last[:, None]
+    largest = last_difference * _growth(ladder.h[first_finer], ladder.h[1:])
     noise = question.noise_factor * (ladder.floor[:, :-1] + ladder.floor[:, 1:])
-    return np.asarray(np.any(is_finer & (sizes > np.maximum(largest, noise)), axis=1))
+    result = np.any(is_finer & (sizes > np.maximum(largest, noise)), axis=1)
+    if ladder.exact_known:
+        errors = np.sqrt(
+            np.stack([np.sum(ladder.gram[:, k:, k:], axis=(1, 2)) for k in range(n)], axis=1)
+        )
+        largest = np.take_along_axis(errors, last[:, None], axis=1)
+        largest = largest * _growth(ladder.h[last][:, None], ladder.h[1:])
+        noise = question.noise_factor * ladder.floor[:, 1:]
+        result |= np.any(is_finer & (errors[:, 1:] > np.maximum(largest, noise)), axis=1)
+    return np.asarray(result)
+
+
+def _growth(coarse: Floats, fine: Floats) -> Floats:
+    """Return the factor by which round-off grows at most from one step size to smaller ones; 1 to larger ones."""
+    return on_arrays.power(np.maximum(coarse / fine, 1.0), GROWTHS[-1])
