@@ -642,3 +642,17 @@ def test_of_levels_that_do_not_approach_each_other_no_error_is_stated(
     assert (grows.error, grows.best) == (None, None)
     assert "error of the finest level" not in grows.text
     assert falls.error == pytest.approx(h[-1] ** 0.5, rel=0.05)
+
+
+@pytest.mark.parametrize("order", [2, 3, 4])
+def test_an_error_that_rises_again_contradicts_the_levels_before(order: int) -> None:
+    """The finest level is wrong by ten times the error of the one before, and by another shape."""
+    t = np.linspace(0.0, 1.0, 65)
+    h = [1 / 64, 1 / 128, 1 / 256, 1 / 512]
+    errors = [(64 * x) ** order * np.sin(3 * t) * t for x in h]
+    errors[-1] = 10 * (64 * h[-2]) ** order * t * np.cos(5 * t)
+    values = [1.0 + 1e-3 * error for error in errors]
+    assert judge(h, values, order=order, exact=np.ones(65)).reason == "pre_asymptotic"
+    # an error that stays may be a floor
+    values[-1] = 1.0 + 0.1 * (values[-1] - 1.0)
+    assert judge(h, values, order=order, exact=np.ones(65)).status == "PASS"

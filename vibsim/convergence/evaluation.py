@@ -168,4 +168,4 @@ def _is_contradicted(ladder: Ladder, p: Posterior, question: Question) -> Flags:
 
 def _growth(coarse: Floats, fine: Floats) -> Floats:
     """Return the factor by which round-off grows at most from one step size to smaller ones; 1 to larger ones."""
-    return on_arrays.power(np.maximum(coarse / fine, 1.0), GROWTHS[-1])
+    return np.asarray(on_arrays.power(np.maximum(coarse / fine, 1.0), GROWTHS[-1]))
