@@ -26,7 +26,7 @@ point has a formula of its own (`Scheme.has_own_end`), or does not exist, the sa
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -104,7 +104,11 @@ def drift_at(block: MemberBlock, level: int, name: str = "energy_deviation") -> 
     )
     end = block.group.end
     periods = np.where(np.isnan(w), end / exact, w * end / (2.0 * np.pi))
-    return drift_of(running, ratio, initial, floor, periods, deviation)
+    found = drift_of(running, ratio, initial, floor, periods, deviation)
+    # the period of a large swing is not that of small oscillations
+    longer = np.where(np.isnan(w * exact) | block.model.linear, 1.0, w * exact / (2.0 * np.pi))
+    factor = np.where(found.kind == QUADRATIC, longer**2, longer)
+    return replace(found, rate=found.rate * factor)
 
 
 def _held(series: Floats, members: Flags) -> Floats:

@@ -8,7 +8,7 @@ import pytest
 from thinned import thinned
 from whole import decided
 
-from vibsim import Experiment
+from vibsim import Experiment, analyse, simulate, verdicts
 
 DRIFTS = ("none", "bounded", "linear", "quadratic")
 
@@ -131,3 +131,22 @@ def test_a_drift_that_has_just_overtaken_an_oscillation_is_linear() -> None:
     experiment = Experiment.from_dict(data)
     told = decided(experiment)
     assert [one.status for one in told] == ["PASS", "FAIL"]
+
+
+def test_a_drift_is_per_period_of_the_motion() -> None:
+    """At 3.1 rad that is 3.3 times as long as the period of small oscillations."""
+    data = {
+        "title": "t",
+        "model": {"kind": "pendulum"},
+        "initial": {"theta": 3.1},
+        "time": {"end": 400.0},
+        "levels": [12],
+        "schemes": ["rk4"],
+        "checks": [{"conserves": "energy", "drift": "linear"}],
+    }
+    experiment = Experiment.from_dict(data)
+    level = simulate(experiment, 12)
+    (verdict,) = verdicts(experiment, analyse(experiment, [level]))
+    lost = -level.energy_deviation.values[0, 0, -1] / level.energy_initial.values.item()
+    per_period = lost * level.exact_period.values.item() / 400.0
+    assert verdict.results[0].facts["drift_rate"] == pytest.approx(per_period, rel=0.1)
