@@ -8,7 +8,7 @@ from thinned import thinned
 
 from vibsim.engine import integrate
 from vibsim.models import MODELS
-from vibsim.schemes import FIXED_STEP, SCHEMES
+from vibsim.schemes import FIXED_STEP, SCHEMES, Stepper
 from vibsim.schemes.base import LOW_STARTS
 from vibsim.theory import discrete, orders, rounding_bound, stability_limit
 
@@ -164,3 +164,22 @@ def test_the_order_on_the_oscillator_is_the_promised_one(scheme, options):
     is_sound = options.get("start") not in LOW_STARTS
     promised = (scheme.formal_order(name, SPRING, options) if is_sound else 1.0 for name in "uv")
     assert orders(scheme.stepper(options)) == tuple(promised)
+
+
+def test_a_scheme_whose_solutions_overflow_has_no_order():
+    """The method of order 3 with two steps that is not zero-stable (Hairer, Norsett and Wanner I, section III.3)."""
+
+    def start(variant, u, v, dt, p, acceleration):
+        return u + dt * v, v + dt * acceleration(u, v, 0.0, p), u, v
+
+    def step(state, t, dt, p, acceleration):
+        u, v, u_before, v_before = state
+        a, a_before = acceleration(u, v, t, p), acceleration(u_before, v_before, t - dt, p)
+        return (
+            -4.0 * u + 5.0 * u_before + dt * (4.0 * v + 2.0 * v_before),
+            -4.0 * v + 5.0 * v_before + dt * (4.0 * a + 2.0 * a_before),
+            u,
+            v,
+        ), v
+
+    assert np.isnan(orders(Stepper(start, step))).all()

@@ -301,7 +301,10 @@ def finer_levels(f: MemberFacts, count: int = FINER) -> str:
 
 
 def _levels_to_add(f: MemberFacts, check: ValueCheck) -> int:
-    """Return how many finer levels a number needs to meet the check if its changes continue to fall as the last two."""
+    """Return how many finer levels a number needs to meet the check if its changes continue to fall as the last two.
+
+    More than `MOST_FINER` stand for any larger number, `FINER` for an unknown one.
+    """
     numbers = _by_level_of(f, check)
     if len(numbers) < LEVELS_OF_AN_ORDER:
         return FINER
@@ -316,7 +319,7 @@ def _levels_to_add(f: MemberFacts, check: ValueCheck) -> int:
     enough = (
         compare(check, limit - left)[0] if check.equals is None else np.abs(left) <= check.allowed
     )
-    return int(steps[np.argmax(enough)]) if np.any(enough) else FINER
+    return int(steps[np.argmax(enough)]) if np.any(enough) else MOST_FINER + 1
 
 
 def _on_mismatch(f: MemberFacts, check: ValueCheck) -> str:
@@ -336,6 +339,9 @@ def _on_mismatch(f: MemberFacts, check: ValueCheck) -> str:
     if f.fact("levels_needed") == SETTLED:
         return f"C{change}, `model:` or `initial:`. Finer levels will not help."
     count = _levels_to_add(f, check)
+    if count > MOST_FINER:
+        more = f"It would take more than {MOST_FINER} finer levels."
+        return f"Take a scheme of higher order (`schemes:`), or c{change}. {more}"
     finest = f.experiment.levels[-1] + count
     ask = f" and ask for one (`at: {_at(check, finest)}`)"
     if check.at.level in (None, "best"):

@@ -94,7 +94,7 @@ def orders(stepper: Stepper) -> tuple[float, float]:
     """Return the orders of position and velocity on ``u'' + u = 0``, whole numbers; infinite where nothing is wrong.
 
     They are read where steps are as short as errors above rounding allow, for a start that is no special one. An order
-    is 0 if the scheme does not converge.
+    is 0 if the scheme does not converge, and NaN where its solutions overflow.
     """
     halvings = np.arange(*HALVINGS)
     found = discrete(stepper, 1.0, 2.0**-halvings, *START, 2**halvings)
@@ -110,7 +110,8 @@ def _order(errors: Floats) -> float:
     end = np.append(np.flatnonzero(~(sizes > LEAST_ERROR)), len(sizes))[0]
     if end < 2:
         return math.inf
-    order = on_arrays.log2(sizes[end - 2 : end - 1] / sizes[end - 1])
+    with np.errstate(invalid="ignore"):  # a solution that overflows has no order
+        order = on_arrays.log2(sizes[end - 2 : end - 1] / sizes[end - 1])
     return float(np.maximum(np.floor(order + NEARLY), 0.0)[0])
 
 

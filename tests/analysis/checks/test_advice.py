@@ -609,6 +609,16 @@ def test_as_many_finer_levels_are_asked_for_as_the_measured_changes_need(kind: s
     assert judged({**run, "levels": [last - 3, last - 2, last - 1]}).status == "FAIL", advice
 
 
+@pytest.mark.usefixtures("with_series")
+def test_a_number_that_would_take_too_many_finer_levels_asks_for_another_scheme() -> None:
+    check = {"value": "end", "quantity": "theta", "equals": -0.7, "atol": 1e-15}
+    model = {"kind": "linear_pendulum", "g": 1.0, "L": 1.0}
+    run = {**RUN, "model": model, "initial": {"theta": 1.0}, "time": {"end": math.acos(-0.7)}}
+    advice = judged({**run, "levels": [8, 9, 10], "checks": [check]}).advice
+    assert advice.startswith("Take a scheme of higher order (`schemes:`)")
+    assert advice.endswith("It would take more than 12 finer levels.")
+
+
 def test_a_number_of_an_adaptive_scheme_asks_for_a_smaller_tolerance() -> None:
     """Its error comes from the tolerance alone: the model and the exact value are right."""
     made = Experiment.from_dict(
