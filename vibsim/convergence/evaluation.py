@@ -156,9 +156,8 @@ def _is_contradicted(ladder: Ladder, p: Posterior, question: Question) -> Flags:
     noise = question.noise_factor * (ladder.floor[:, :-1] + ladder.floor[:, 1:])
     result = np.any(is_finer & (sizes > np.maximum(largest, noise)), axis=1)
     if ladder.exact_known:
-        errors = np.sqrt(
-            np.stack([np.sum(ladder.gram[:, k:, k:], axis=(1, 2)) for k in range(n)], axis=1)
-        )
+        squares = [np.sum(ladder.gram[:, k:, k:], axis=(1, 2)) for k in range(n)]
+        errors = np.sqrt(np.maximum(np.stack(squares, axis=1), 0.0))
         largest = np.take_along_axis(errors, last[:, None], axis=1)
         largest = largest * _growth(ladder.h[last][:, None], ladder.h[1:])
         noise = question.noise_factor * ladder.floor[:, 1:]
