@@ -1,4 +1,4 @@
-"""Base class of the number types on which theory runs the functions of a scheme, and algebra for any of them."""
+"""Algebra for any of the number types on which theory runs the functions of a scheme."""
 
 from __future__ import annotations
 
@@ -6,54 +6,6 @@ from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
-
-
-class Arithmetic:
-    """Operators that follow from ``+ * /``, negation and `lift`, which converts a number to this type.
-
-    Comparisons reduce arrays: ``>`` and ``>=`` tell whether any entry is larger, ``<`` and ``<=`` whether all are
-    smaller. So a loop that continues while a correction is large ends when all are small.
-    """
-
-    __slots__ = ()
-
-    __add__: Any
-    __neg__: Any
-    __mul__: Any
-    __truediv__: Any
-    lift: Any
-    nearest: Any
-    """Floats with the same signs."""
-
-    def __pos__(self) -> Any:
-        return self
-
-    def __radd__(self, other: Any) -> Any:
-        return self + other
-
-    def __rmul__(self, other: Any) -> Any:
-        return self * other
-
-    def __sub__(self, other: Any) -> Any:
-        return self + -self.lift(other)
-
-    def __rsub__(self, other: Any) -> Any:
-        return self.lift(other) + -self
-
-    def __rtruediv__(self, other: Any) -> Any:
-        return self.lift(other) / self
-
-    def __gt__(self, other: Any) -> bool:
-        return bool(np.any((self - other).nearest > 0))
-
-    def __ge__(self, other: Any) -> bool:
-        return bool(np.any((self - other).nearest >= 0))
-
-    def __lt__(self, other: Any) -> bool:
-        return bool(np.all((self - other).nearest < 0))
-
-    def __le__(self, other: Any) -> bool:
-        return bool(np.all((self - other).nearest <= 0))
 
 
 def characteristic(matrix: Any) -> list[Any]:

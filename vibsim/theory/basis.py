@@ -17,12 +17,21 @@ from functools import lru_cache
 from types import FunctionType, MappingProxyType
 from typing import Any
 
+import numpy as np
+
+from vibsim.core.errors import VibsimError
 from vibsim.elementary import ELEMENTARY
 from vibsim.formula import Binary, Call, Expression, Name, Negate, Number, parse
 from vibsim.formula.tree import OPERATORS
 from vibsim.schemes.base import Stepper, handed
 from vibsim.schemes.code_generation import exact_names
+from vibsim.schemes.step_numbers import MOST_COMPARISONS, EndlessStepError, Plain, counting
+from vibsim.theory.doubled import Doubled
 
+SMALL = 0.1
+"""A value of ``w dt`` at which every scheme that is accepted can make a step."""
+_LONGER = 4
+"""How many times as many comparisons two numbers of 32 digits may take to agree as two floats."""
 LARGEST = 1000
 """Largest denominator of the fractions that floats are converted to."""
 Reader = Callable[[str], Any]
@@ -67,11 +76,13 @@ def unit_steps(
     damping: Any = None,
     substitutes: Substitutes = _NONE,
     with_start: bool = True,
+    most: int = MOST_COMPARISONS,
 ) -> UnitSteps:
     """Return the images of unit vectors under a step and the start.
 
     `p` is ``w dt`` in the type of number to use, `zero` a zero of that type and shape, `square` is ``p^2`` if that
-    differs from the product, and `damping` is g (None for no damping).
+    differs from the product, and `damping` is g (None for no damping). `EndlessStepError` if one call of a function
+    makes more than `most` comparisons.
     """
     one = zero + 1.0
     force, push = stepper.scaling(p) if stepper.scaling else (one, one)
@@ -86,7 +97,8 @@ def unit_steps(
 
     def bound(function: Callable[..., Any]) -> Callable[..., Any]:
         exact = rebound(function, read, substitutes)
-        return handed(exact, acceleration, slopes, lambda u, v, t, q: rate)
+        whole = handed(exact, acceleration, slopes, lambda u, v, t, q: rate)
+        return counting(whole, most)
 
     size = range(_carried(stepper))
     units = [tuple(one if i == j else zero for i in size) for j in size]
@@ -98,11 +110,55 @@ def unit_steps(
         starts = [start(stepper.variant, u, v, one, ()) for u, v in ((one, zero), (zero, push))]
     backward = None
     if stepper.end == "backward":
-        one_sided = rebound(stepper.backward, read)
+        one_sided = counting(rebound(stepper.backward, read), most)
         backward = [one_sided(unit, one) for unit in units]
     return UnitSteps(
         [following for following, _ in steps], [own for _, own in steps], starts, backward
     )
+
+
+def where_it_ends(
+    run: Callable[[Doubled, int], UnitSteps], stepper: Stepper, p: Doubled
+) -> UnitSteps:
+    """Return ``run(p, most)``, in arrays (`unit_steps`), NaN for each p where a loop of the step does not end.
+
+    A number of arrays continues a loop while any entry does. So where it does not end, a float tells for each p alone
+    whether the step can be used there.
+    """
+    try:
+        return run(p, MOST_COMPARISONS)
+    except EndlessStepError:
+        usable = np.array([_ends(stepper, float(x)) for x in p.high.flat]).reshape(p.shape)
+    near = Doubled(np.where(usable, p.high, SMALL), np.where(usable, p.low, 0.0))
+    try:
+        found = run(near, _LONGER * MOST_COMPARISONS)
+    except EndlessStepError:
+        name = stepper.step.__name__
+        raise VibsimError(
+            f"the theory of the step {name} cannot be computed: a loop of it does not end in numbers of 32 digits. End "
+            "it when a correction is small, such as abs(change) > 1e-14"
+        ) from None
+    gap = np.where(usable, 0.0, np.nan)
+
+    def marked(numbers: Sequence[Any]) -> list[Any]:
+        return [number + gap for number in numbers]
+
+    return UnitSteps(
+        [marked(column) for column in found.step],
+        marked(found.velocity),
+        [marked(column) for column in found.start],
+        None if found.backward is None else marked(found.backward),
+    )
+
+
+@lru_cache(maxsize=4096)
+def _ends(stepper: Stepper, p: float) -> bool:
+    """Tell whether no function of a scheme makes too many comparisons of floats at ``w dt = p``."""
+    try:
+        unit_steps(stepper, Plain(p), Plain(0.0), lambda formula: Plain(float(decimal(formula))))
+    except EndlessStepError:
+        return False
+    return True
 
 
 def rebound(

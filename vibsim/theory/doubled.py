@@ -19,7 +19,7 @@ from numpy.typing import ArrayLike
 
 from vibsim.core.array_types import Floats
 from vibsim.elementary.doubled import fast_two_sum, two_product, two_sum
-from vibsim.theory.arithmetic import Arithmetic
+from vibsim.schemes.step_numbers import Arithmetic
 
 
 @dataclass(frozen=True, eq=False, slots=True)

@@ -22,7 +22,7 @@ from typing import Any
 from vibsim.elementary import ELEMENTARY
 from vibsim.schemes.base import Stepper
 from vibsim.schemes.newton import solved, solved_together
-from vibsim.theory.arithmetic import Arithmetic
+from vibsim.schemes.step_numbers import Arithmetic
 from vibsim.theory.basis import exact, fraction_of, reads
 
 HALF = Fraction(1, 2)

@@ -31,6 +31,7 @@ from vibsim.formula import (
 )
 from vibsim.models.base import Model, tree
 from vibsim.schemes.base import Stepper, handed
+from vibsim.schemes.step_numbers import counting
 from vibsim.theory.basis import rebound, value_of
 from vibsim.theory.laurent import SUBSTITUTES, Field, Laurent, coefficients
 
@@ -168,7 +169,7 @@ class Course:
             raise ValueError("what solves the equation of a step by series asks for no slopes")
 
         exact_function = rebound(function, self.read, SUBSTITUTES)
-        return handed(exact_function, acceleration, slopes, lambda u, v, t, p: rate)
+        return counting(handed(exact_function, acceleration, slopes, lambda u, v, t, p: rate))
 
     def _of_model(self, u: Any, v: Any, t: Any) -> Any:
         if self.forces is Forces.NONE:

@@ -25,7 +25,7 @@ from vibsim.core.array_types import Complexes, Flags, Floats
 from vibsim.elementary import on_arrays
 from vibsim.schemes.base import Options, Scheme, Stepper
 from vibsim.theory.arithmetic import bairstow, characteristic
-from vibsim.theory.basis import UnitSteps, decimal, unit_steps
+from vibsim.theory.basis import UnitSteps, decimal, unit_steps, where_it_ends
 from vibsim.theory.doubled import Doubled, doubled, root, stacked
 
 GRID = np.concatenate([0.02 * np.arange(1, 401), np.geomspace(8.0, 1000.0, 61)[1:]])
@@ -76,8 +76,14 @@ def amplification(stepper: Stepper, p: ArrayLike | Doubled) -> Amplification:
 
 def _units(stepper: Stepper, p: Doubled, *, with_start: bool = True) -> UnitSteps:
     zero = doubled(np.zeros(p.shape))
+
+    def run(p: Doubled, most: int) -> UnitSteps:
+        return unit_steps(
+            stepper, p, zero, lambda f: doubled(decimal(f)), with_start=with_start, most=most
+        )
+
     with np.errstate(all="ignore"):
-        return unit_steps(stepper, p, zero, lambda f: doubled(decimal(f)), with_start=with_start)
+        return where_it_ends(run, stepper, p)
 
 
 def _matrix(columns: Sequence[Sequence[Any]], shape: tuple[int, ...]) -> Doubled:

@@ -23,10 +23,10 @@ from numpy.typing import ArrayLike
 
 from vibsim.core.array_types import Floats, Integers
 from vibsim.schemes.base import UNIT_ROUND_OFF, Stepper
-from vibsim.theory.arithmetic import Arithmetic
-from vibsim.theory.basis import decimal, unit_steps
+from vibsim.schemes.step_numbers import Arithmetic
+from vibsim.theory.basis import UnitSteps, decimal, unit_steps, where_it_ends
 from vibsim.theory.discrete import Scaled, applied, first_state, position, scaled, transposed
-from vibsim.theory.doubled import Doubled, product
+from vibsim.theory.doubled import Doubled, doubled, product
 from vibsim.theory.roots import amplification
 
 SQUARE = 8.0
@@ -127,7 +127,7 @@ def _bounds(
     if stepper.end == "extrapolate":
         # 2 v^(N-1) - v^(N-2)
         velocity = 3.0 * velocity + 4.0 * of_reading
-    return UNIT_ROUND_OFF * reached(position(exact)), UNIT_ROUND_OFF * velocity / dt
+    return UNIT_ROUND_OFF * reached(position(exact)), UNIT_ROUND_OFF * _or_infinite(velocity) / dt
 
 
 def _or_infinite(size: Floats) -> Floats:
@@ -149,8 +149,15 @@ def _sizes(states: Scaled) -> Floats:
 
 def _roundings(stepper: Stepper, p: Floats) -> tuple[Floats, Floats, Floats]:
     """Return bounds of the rounding errors of a step, a velocity and a start, in the shapes of `Amplification`."""
-    zero, square = Bounded.lift(np.zeros_like(p)), Bounded(p * p, SQUARE * p * p)
-    units = unit_steps(stepper, Bounded(p, p), zero, _coefficient, square=square)
+    zero = Bounded.lift(np.zeros_like(p))
+
+    def run(p: Doubled, most: int) -> UnitSteps:
+        w_dt = p.high
+        square = Bounded(w_dt * w_dt, SQUARE * w_dt * w_dt)
+        number = Bounded(w_dt, w_dt)
+        return unit_steps(stepper, number, zero, _coefficient, square=square, most=most)
+
+    units = where_it_ends(run, stepper, doubled(p))
 
     def errors(numbers: Sequence[Any]) -> Floats:
         parts = [np.broadcast_to(Bounded.lift(number).error, p.shape) for number in numbers]

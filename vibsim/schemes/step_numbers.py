@@ -1,0 +1,149 @@
+"""The numbers that the functions of a scheme run on where these are not floats: what they offer is all a step may use.
+
+That is ``+ - * /``, powers with a small whole exponent, `abs` and comparisons. A step may compare in a loop, until two
+values agree. On numbers that no computer's step would reach such a loop may never end, so comparisons are counted.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from contextvars import ContextVar
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from vibsim.core.errors import VibsimError
+
+HIGHEST_POWER = 8
+"""Highest exponent of a power in a step, which is multiplied out."""
+MOST_COMPARISONS = 500
+"""Comparisons after which a step counts as one that does not end; an iteration of a usual step needs some tens."""
+
+
+class EndlessStepError(VibsimError):
+    """A function of a scheme that made more comparisons than are allowed."""
+
+
+_LEFT: ContextVar[list[int] | None] = ContextVar("comparisons left", default=None)
+
+
+def counting(function: Callable[..., Any], most: int = MOST_COMPARISONS) -> Callable[..., Any]:
+    """Return a function that raises `EndlessStepError` if one call of it makes more than `most` comparisons."""
+
+    def counted(*arguments: Any) -> Any:
+        token = _LEFT.set([most])
+        try:
+            return function(*arguments)
+        finally:
+            _LEFT.reset(token)
+
+    return counted
+
+
+class Arithmetic:
+    """Operators that follow from ``+ * /``, negation and `lift`, which converts a number to this type.
+
+    Comparisons reduce arrays: ``>``, ``>=`` and ``!=`` tell whether any entry is larger or different, ``<``, ``<=`` and
+    ``==`` whether all are smaller or equal. So a loop that continues while a correction is large ends when all are
+    small, and a NaN ends it.
+    """
+
+    __slots__ = ()
+
+    __add__: Any
+    __neg__: Any
+    __mul__: Any
+    __truediv__: Any
+    lift: Any
+    nearest: Any
+    """Floats with the same signs."""
+    __hash__ = object.__hash__
+
+    def __pos__(self) -> Any:
+        return self
+
+    def __radd__(self, other: Any) -> Any:
+        return self + other
+
+    def __rmul__(self, other: Any) -> Any:
+        return self * other
+
+    def __sub__(self, other: Any) -> Any:
+        return self + -self.lift(other)
+
+    def __rsub__(self, other: Any) -> Any:
+        return self.lift(other) + -self
+
+    def __rtruediv__(self, other: Any) -> Any:
+        return self.lift(other) / self
+
+    def __pow__(self, exponent: Any) -> Any:
+        if exponent not in range(1, HIGHEST_POWER + 1):
+            return NotImplemented
+        result = self
+        for _ in range(int(exponent) - 1):
+            result = result * self
+        return result
+
+    def __bool__(self) -> bool:
+        raise TypeError("a number is no condition: compare it with another")
+
+    def __gt__(self, other: Any) -> bool:
+        return bool(np.any(self._beyond(other) > 0))
+
+    def __ge__(self, other: Any) -> bool:
+        return bool(np.any(self._beyond(other) >= 0))
+
+    def __lt__(self, other: Any) -> bool:
+        return bool(np.all(self._beyond(other) < 0))
+
+    def __le__(self, other: Any) -> bool:
+        return bool(np.all(self._beyond(other) <= 0))
+
+    def __ne__(self, other: Any) -> bool:
+        return other is not self and bool(np.any(np.abs(self._beyond(other)) > 0))
+
+    def __eq__(self, other: Any) -> bool:
+        return not self != other
+
+    def _beyond(self, other: Any) -> Any:
+        """Return floats with the signs of the difference to another number, which is then compared with 0."""
+        left = _LEFT.get()
+        if left is not None:
+            left[0] -= 1
+            if left[0] < 0:
+                raise EndlessStepError("a loop of the step does not end")
+        return (self - other).nearest
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class Plain(Arithmetic):
+    """A float that offers only what a step may use; a division by zero gives no error, as in compiled code."""
+
+    nearest: float
+
+    @staticmethod
+    def lift(other: Any) -> Plain:
+        """Convert a number."""
+        return other if isinstance(other, Plain) else Plain(float(other))
+
+    def __add__(self, other: Any) -> Plain:
+        return Plain(self.nearest + self.lift(other).nearest)
+
+    def __neg__(self) -> Plain:
+        return Plain(-self.nearest)
+
+    def __mul__(self, other: Any) -> Plain:
+        return Plain(self.nearest * self.lift(other).nearest)
+
+    def __truediv__(self, other: Any) -> Plain:
+        divisor = self.lift(other).nearest
+        if divisor != 0.0:
+            return Plain(self.nearest / divisor)
+        size = math.nan if self.nearest == 0.0 else math.copysign(math.inf, self.nearest)
+        return Plain(size * math.copysign(1.0, divisor))
+
+    def __abs__(self) -> Plain:
+        return Plain(abs(self.nearest))
