@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import copy
+import math
 import pickle
 from collections.abc import Callable
 from dataclasses import replace
@@ -11,9 +12,10 @@ from typing import Any
 import numpy as np
 import pytest
 
-from vibsim import Experiment, analyse, best, simulate, verdicts
+from vibsim import Experiment, analyse, best, simulate, theory, verdicts
 from vibsim.core import registry
 from vibsim.core.errors import Fault, InputError, SimulationError
+from vibsim.engine import LANES, integrate
 from vibsim.experiment import canonical
 from vibsim.models import MODELS, Damping, Model, Parameter, State
 from vibsim.schemes import SCHEMES, Flag, Scheme, Stepper
@@ -318,3 +320,103 @@ def test_bounds_of_best_values_reach_an_exact_solution_that_the_levels_miss() ->
         assert bound > 1e-6
     # an unknown part of a period is of the same origin
     assert np.isnan(found["period_richardson_error"].item())
+
+
+def start_at_once(variant, u, v, dt, p, acceleration):
+    return u, v
+
+
+def with_step(step: Any) -> Any:
+    stepper = Stepper(start_at_once, step)
+    return replace(RALSTON, stepper=lambda options: stepper)
+
+
+def with_cosine(state, t, dt, p, acceleration):
+    u, v = state
+    return (u + dt * v, v + dt * math.cos(dt) * acceleration(u, v, t, p)), v
+
+
+def with_rounding(state, t, dt, p, acceleration):
+    u, v = state
+    return (u + round(dt, 6) * v, v + dt * acceleration(u, v, t, p)), v
+
+
+def with_root(state, t, dt, p, acceleration):
+    u, v = state
+    return (u + dt * v, v + (dt * dt) ** 0.5 * acceleration(u, v, t, p)), v
+
+
+def with_named_power(state, t, dt, p, acceleration):
+    u, v = state
+    n = 2
+    return (u + dt * v + 0.5 * dt**n * acceleration(u, v, t, p), v), v
+
+
+def without_velocity(state, t, dt, p, acceleration):
+    u, v = state
+    return u + dt * v, v + dt * acceleration(u, v, t, p)
+
+
+def with_one_number(state, t, dt, p, acceleration):
+    u, v = state
+    return (u + dt * v,), v
+
+
+def without_end(state, t, dt, p, acceleration):
+    u, v = state
+    while dt < 1.0:
+        v = v + 0.0
+    return (u + dt * v, v + dt * acceleration(u, v, t, p)), v
+
+
+@pytest.mark.parametrize(
+    ("step", "rule"),
+    [
+        (with_cosine, "whole powers up to **8, abs and comparisons"),
+        (with_rounding, "cannot be run (TypeError"),
+        (with_root, "cannot be run (TypeError"),
+        (with_named_power, "its with_named_power has dt ** n"),
+        (without_velocity, "its step must return the next state"),
+        (with_one_number, "its step must return the next state"),
+        (without_end, "a loop of the step does not end"),
+        (lambda state, t, dt, p, acceleration: (state, state[1]), "not lambda"),
+    ],
+)
+def test_a_step_that_theory_cannot_follow_is_refused_by_name(step: Any, rule: str) -> None:
+    """What only floats can do, such as math.cos, passed the experiment and the simulation."""
+    (fault,) = faults(schemes=[with_step(step)])
+    assert rule in fault.rule
+    assert fault.value == RALSTON.kind
+
+
+def with_power(state, t, dt, p, acceleration):
+    u, v = state
+    a = acceleration(u, v, t, p)
+    return (u + dt * v + 0.5 * dt**2 * a + (u + dt * v) ** 3 * dt**5, v + dt * a), v
+
+
+def with_products(state, t, dt, p, acceleration):
+    u, v = state
+    a = acceleration(u, v, t, p)
+    w = u + dt * v
+    return (
+        u + dt * v + 0.5 * (dt * dt) * a + (w * w * w) * (dt * dt * dt * dt * dt),
+        v + dt * a,
+    ), v
+
+
+def test_a_power_is_a_product_in_every_lane_and_in_theory() -> None:
+    ends = set()
+    starts, steps = np.array([[0.3, 0.1], [1.0, 0.7], [0.9, -0.3]]), np.array([0.1, 0.3, 0.7])
+    parameters = np.tile([p.default for p in MODELS["spring"].parameters], (3, 1))
+    for step in (with_power, with_products):
+        scheme = with_step(step)
+        for lane in LANES:
+            run = integrate(
+                MODELS["spring"], scheme, {}, parameters, starts, steps, 9, 1, lane=lane, with_gathered=False
+            )  # fmt: skip
+            ends.add(run.states.tobytes())
+    assert len(ends) == 1
+    a, b = (theory.roots(with_step(f).stepper({}), 0.5) for f in (with_power, with_products))
+    assert a == b
+    build(schemes=[with_step(with_power)])

@@ -72,7 +72,7 @@ class Registry(Mapping[str, Entry]):
         checked: dict[str, Entry] = {}
         for entry in entries:
             fault = self._fault_of(entry)
-            name = "" if fault else entry.kind
+            name = str(entry.kind) if isinstance(entry, self._type) else ""
             if not fault and checked.get(name, self.built_in.get(name, entry)) is not entry:
                 fault = "the name is taken: give it another kind"
             if fault:

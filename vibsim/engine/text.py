@@ -7,6 +7,7 @@ functions are collected recursively. Anything else is refused.
 from __future__ import annotations
 
 import ast
+import copy
 import inspect
 import math
 import types
@@ -17,6 +18,7 @@ from typing import Any
 
 from vibsim.core.errors import SimulationError
 from vibsim.schemes.base import HANDED
+from vibsim.schemes.step_numbers import POWER_RULE, is_small_power
 
 
 @dataclass
@@ -153,7 +155,7 @@ def _text_of(
 ) -> _Text:
     _strip(tree, name)
     is_marked, tree.decorator_list = bool(tree.decorator_list), []
-    tree = _Settled(settings).visit(tree)
+    tree = _Powers(name).visit(_Settled(settings).visit(tree))
     arguments = {argument.arg for argument in tree.args.args}
     local = (arguments | set(function.__code__.co_varnames)) - set(HANDED)
     names = [node for node in ast.walk(tree) if isinstance(node, ast.Name) and node.id not in local]
@@ -241,6 +243,25 @@ class _Settled(ast.NodeTransformer):
         if not isinstance(value, bool):
             return node
         return (node.body if value else node.orelse) or None
+
+
+class _Powers(ast.NodeTransformer):
+    """Multiplies out a power with a small whole exponent, for the same bits in every lane."""
+
+    def __init__(self, name: str) -> None:
+        self.name = name
+
+    def visit_BinOp(self, node: ast.BinOp) -> ast.AST:
+        self.generic_visit(node)
+        if not isinstance(node.op, ast.Pow):
+            return node
+        if not is_small_power(node):
+            raise SimulationError(f"{self.name}: {POWER_RULE}, not {ast.unparse(node)}")
+        assert isinstance(node.right, ast.Constant)
+        result = node.left
+        for _ in range(int(node.right.value) - 1):
+            result = ast.BinOp(left=result, op=ast.Mult(), right=copy.deepcopy(node.left))
+        return result
 
 
 def divided(a: Any, b: Any) -> Any:

@@ -7,6 +7,7 @@ comparisons, so that every lane gives the same bits.
 
 from __future__ import annotations
 
+import ast
 import inspect
 import math
 from collections.abc import Callable, Mapping
@@ -18,6 +19,15 @@ from vibsim.core.array_types import Floats
 from vibsim.models.base import BUDGET, Model, components
 from vibsim.models.events import TREATMENTS
 from vibsim.schemes.orders import Beginning, Orders, depends_on_velocity
+from vibsim.schemes.step_numbers import (
+    HIGHEST_POWER,
+    MOST_COMPARISONS,
+    POWER_RULE,
+    EndlessStepError,
+    Plain,
+    counting,
+    is_small_power,
+)
 
 OptionValue = str | float | bool
 Options = Mapping[str, OptionValue]
@@ -314,6 +324,46 @@ class Scheme:
         return model.lookup is None or (model.lookup.is_met and not is_multistep)
 
 
+STEP_RULE = (
+    f"it may use + - * /, whole powers up to **{HIGHEST_POWER}, abs and comparisons, takes "
+    "(state, t, dt, p, acceleration), and returns two things, the next state as a tuple and the velocity"
+)
+
+
+def _fault_of_text(stepper: Stepper) -> str:
+    """Return what the text of a scheme's functions shows to be at fault; empty if nothing, or if there is no text."""
+    for function in (stepper.start, stepper.step, stepper.backward):
+        if function.__name__ == "<lambda>":
+            return "its start, step and backward must be functions written with def, not lambda"
+        try:
+            tree = ast.parse(inspect.cleandoc("\n" + inspect.getsource(function)))
+        except (OSError, TypeError, SyntaxError):
+            continue
+        for node in ast.walk(tree):
+            is_power = isinstance(node, ast.BinOp) and isinstance(node.op, ast.Pow)
+            if is_power and not is_small_power(node):
+                return f"its {function.__name__} has {ast.unparse(node)}: {POWER_RULE}"
+    return ""
+
+
+def _fault_of_step(stepper: Stepper, u: float, v: float) -> str:
+    """Return what is wrong with the results of start and step; empty if nothing.
+
+    They run on numbers that offer no more than a step may use, so that they raise an error where they use more.
+    """
+    forces = (lambda u, v, t, p: -u, lambda u, v, t, p: (Plain(-1.0), Plain(0.0)))
+    start, step = (counting(handed(f, *forces)) for f in (stepper.start, stepper.step))
+    state = start(stepper.variant, Plain(u), Plain(v), Plain(0.1), ())
+    made: Any = step(state, Plain(0.1), Plain(0.1), ())
+    shapes = [len(part) if isinstance(part, tuple) else 0 for part in made]
+    if shapes != [len(state), 0]:
+        return "its step must return the next state, as long as that of the start, and the velocity"
+    numbers = [Plain.lift(number).nearest for number in (*state, *made[0], made[1])]
+    if not all(map(math.isfinite, numbers)):
+        return f"its step gives a number that is not finite, from u = {u:g} and v = {v:g} with w dt = 0.1"
+    return ""
+
+
 def fault_of(scheme: Scheme) -> str:
     """Return why a scheme from an installed package cannot be added; empty if it can."""
     if scheme.adaptive:
@@ -322,12 +372,17 @@ def fault_of(scheme: Scheme) -> str:
     stepper: object = scheme.stepper(options)
     if not isinstance(stepper, Stepper):
         return "its stepper must return a vibsim.schemes.Stepper"
-    force = (lambda u, v, t, p: -u, lambda u, v, t, p: (-1.0, 0.0))
-    state = handed(stepper.start, *force)(stepper.variant, 1.0, 0.0, 0.1, ())
-    made: Any = handed(stepper.step, *force)(state, 0.1, 0.1, ())
-    shapes = [len(part) if isinstance(part, tuple) else 0 for part in made]
-    if shapes != [len(state), 0]:
-        return "its step must return the next state, as long as that of the start, and the velocity"
+    for u, v in ((1.0, 0.0), (-1.0, 0.5), (1.0, -0.5)):
+        try:
+            fault = _fault_of_step(stepper, u, v)
+        except EndlessStepError as error:
+            return f"{error}: it made more than {MOST_COMPARISONS} comparisons at w dt = 0.1"
+        except Exception as error:
+            return f"its step cannot be run ({type(error).__name__}: {error}): {STEP_RULE}"
+        if fault:
+            return fault
+    if fault := _fault_of_text(stepper):
+        return fault
     if not isinstance(scheme.orders(options), Orders):
         return "its orders must return a vibsim.schemes.orders.Orders"
     return ""

@@ -6,6 +6,7 @@ values agree. On numbers that no computer's step would reach such a loop may nev
 
 from __future__ import annotations
 
+import ast
 import math
 from collections.abc import Callable
 from contextvars import ContextVar
@@ -18,6 +19,9 @@ from vibsim.core.errors import VibsimError
 
 HIGHEST_POWER = 8
 """Highest exponent of a power in a step, which is multiplied out."""
+POWER_RULE = (
+    f"the exponent of a power must be a whole number from 1 to {HIGHEST_POWER}, as in dt**2"
+)
 MOST_COMPARISONS = 500
 """Comparisons after which a step counts as one that does not end; an iteration of a usual step needs some tens."""
 
@@ -27,6 +31,12 @@ class EndlessStepError(VibsimError):
 
 
 _LEFT: ContextVar[list[int] | None] = ContextVar("comparisons left", default=None)
+
+
+def is_small_power(node: ast.BinOp) -> bool:
+    """Tell whether a power in the text of a step has an exponent that is written as a small whole number."""
+    exponent = node.right.value if isinstance(node.right, ast.Constant) else None
+    return exponent in range(1, HIGHEST_POWER + 1)
 
 
 def counting(function: Callable[..., Any], most: int = MOST_COMPARISONS) -> Callable[..., Any]:
