@@ -18,7 +18,7 @@ from typing import Any
 
 from vibsim.core.errors import SimulationError
 from vibsim.schemes.base import HANDED
-from vibsim.schemes.step_numbers import POWER_RULE, is_small_power
+from vibsim.schemes.step_numbers import POWER_RULE, small_power
 
 
 @dataclass
@@ -255,11 +255,11 @@ class _Powers(ast.NodeTransformer):
         self.generic_visit(node)
         if not isinstance(node.op, ast.Pow):
             return node
-        if not is_small_power(node):
+        exponent = small_power(node)
+        if not exponent:
             raise SimulationError(f"{self.name}: {POWER_RULE}, not {ast.unparse(node)}")
-        assert isinstance(node.right, ast.Constant)
         result = node.left
-        for _ in range(int(node.right.value) - 1):
+        for _ in range(exponent - 1):
             result = ast.BinOp(left=result, op=ast.Mult(), right=copy.deepcopy(node.left))
         return result
 

@@ -26,7 +26,7 @@ from vibsim.schemes.step_numbers import (
     EndlessStepError,
     Plain,
     counting,
-    is_small_power,
+    small_power,
 )
 
 OptionValue = str | float | bool
@@ -340,8 +340,9 @@ def _fault_of_text(stepper: Stepper) -> str:
         except (OSError, TypeError, SyntaxError):
             continue
         for node in ast.walk(tree):
-            is_power = isinstance(node, ast.BinOp) and isinstance(node.op, ast.Pow)
-            if is_power and not is_small_power(node):
+            if not (isinstance(node, ast.BinOp) and isinstance(node.op, ast.Pow)):
+                continue
+            if not small_power(node):
                 return f"its {function.__name__} has {ast.unparse(node)}: {POWER_RULE}"
     return ""
 
@@ -351,7 +352,7 @@ def _fault_of_step(stepper: Stepper, u: float, v: float) -> str:
 
     They run on numbers that offer no more than a step may use, so that they raise an error where they use more.
     """
-    forces = (lambda u, v, t, p: -u, lambda u, v, t, p: (Plain(-1.0), Plain(0.0)))
+    forces: Any = (lambda u, v, t, p: -u, lambda u, v, t, p: (Plain(-1.0), Plain(0.0)))
     start, step = (counting(handed(f, *forces)) for f in (stepper.start, stepper.step))
     state = start(stepper.variant, Plain(u), Plain(v), Plain(0.1), ())
     made: Any = step(state, Plain(0.1), Plain(0.1), ())

@@ -33,10 +33,12 @@ class EndlessStepError(VibsimError):
 _LEFT: ContextVar[list[int] | None] = ContextVar("comparisons left", default=None)
 
 
-def is_small_power(node: ast.BinOp) -> bool:
-    """Tell whether a power in the text of a step has an exponent that is written as a small whole number."""
+def small_power(node: ast.BinOp) -> int:
+    """Return the exponent of a power in the text of a step; 0 if it is not written as a small whole number."""
     exponent = node.right.value if isinstance(node.right, ast.Constant) else None
-    return exponent in range(1, HIGHEST_POWER + 1)
+    if isinstance(exponent, int | float) and exponent in range(1, HIGHEST_POWER + 1):
+        return int(exponent)
+    return 0
 
 
 def counting(function: Callable[..., Any], most: int = MOST_COMPARISONS) -> Callable[..., Any]:
