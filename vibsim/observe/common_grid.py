@@ -59,7 +59,10 @@ def common_grid(records: Mapping[int, Record]) -> Grid:
     Raises VibsimError if there is no level, or the levels have fewer than two sample times in common.
     """
     if not records:
-        raise VibsimError("analysis needs the data of at least one level")
+        raise VibsimError(
+            "analysis needs the data of at least one level. An experiment with `tolerance:` has no levels of its own: "
+            "vibsim.best(experiment) chooses and simulates them"
+        )
     levels = tuple(sorted(records))
     steps = tuple(records[level].whole("steps") for level in levels)
     every = tuple(records[level].whole("every") for level in levels)
