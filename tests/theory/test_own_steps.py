@@ -1,12 +1,12 @@
-"""Theory of a step that somebody else wrote: one that iterates until two numbers agree, and so may not end."""
+"""Theory of steps that somebody else wrote: they iterate, round, and grow in ways that no scheme of vibsim does."""
 
 import math
 
 import pytest
 
-from vibsim import theory
+from vibsim import Experiment, analyse, simulate, theory, verdicts
 from vibsim.core.errors import VibsimError
-from vibsim.schemes import Scheme
+from vibsim.schemes import FIXED_STEP, Scheme, Stepper
 from vibsim.schemes.code_generation import self_starting
 from vibsim.schemes.orders import same_orders
 
@@ -63,3 +63,100 @@ def test_a_loop_that_does_not_end_limits_the_step():
 def test_a_loop_that_32_digits_do_not_end_is_refused():
     with pytest.raises(VibsimError, match="the theory of the step until_lost cannot be computed"):
         theory.roots(own(until_lost).stepper({}), [0.5])
+
+
+ROOT = 0.28867513459481287
+
+
+def gauss_by_iteration(state, t, dt, p, acceleration):
+    """Make twelve iterations of Gauss's method, which leaves a growth of the order of (w dt)^14 per step."""
+    u, v = state
+    a_1 = a_2 = acceleration(u, v, t, p)
+    v_1 = v_2 = v
+    for _ in range(12):
+        x_1 = u + dt * (0.25 * v_1 + (0.25 - ROOT) * v_2)
+        x_2 = u + dt * ((0.25 + ROOT) * v_1 + 0.25 * v_2)
+        w_1 = v + dt * (0.25 * a_1 + (0.25 - ROOT) * a_2)
+        w_2 = v + dt * ((0.25 + ROOT) * a_1 + 0.25 * a_2)
+        v_1, v_2 = w_1, w_2
+        a_1 = acceleration(x_1, w_1, t + (0.5 - ROOT) * dt, p)
+        a_2 = acceleration(x_2, w_2, t + (0.5 + ROOT) * dt, p)
+    return (u + dt * 0.5 * (v_1 + v_2), v + dt * 0.5 * (a_1 + a_2)), v
+
+
+SPLIT = 536870913.0
+
+
+def verlet_in_single_precision(state, t, dt, p, acceleration):
+    """Round position and velocity to 24 bits after each step."""
+    u, v = state
+    a = acceleration(u, v, t, p)
+    x = u + dt * v + 0.5 * dt * dt * a
+    w = v + 0.5 * dt * (a + acceleration(x, v, t + dt, p))
+    x = x * SPLIT - (x * SPLIT - x)
+    w = w * SPLIT - (w * SPLIT - w)
+    return (x, w), v
+
+
+def judged(scheme, levels, *checks):
+    experiment = Experiment(
+        model="spring",
+        parameters={"w": 2.0},
+        initial={"u": 1.0, "v": 0.5},
+        schemes=[scheme],
+        time={"end": 20.0},
+        levels=levels,
+        checks=[*checks],
+    )
+    runs = [simulate(experiment, level) for level in experiment.levels]
+    return verdicts(experiment, analyse(experiment, runs))
+
+
+@pytest.mark.parametrize(
+    ("step", "order", "limit"),
+    [(gauss_by_iteration, 4, 0.0), (verlet_in_single_precision, 2, 2.0)],
+)
+def test_growth_that_no_run_can_see_is_no_instability(step, order, limit):
+    scheme = own(step)
+    assert theory.stability_limit(scheme, {}) == pytest.approx(limit, rel=1e-9)
+    checks = {"converges": "u", "order": order}, {"stable": True}
+    assert [v.status for v in judged(scheme, [6, 7, 8], *checks)] == ["PASS", "PASS"]
+
+
+def start_by_heun(variant, u, v, dt, p, acceleration):
+    a = acceleration(u, v, 0.0, p)
+    v_1 = v + dt * a
+    a_1 = acceleration(u + dt * v, v_1, dt, p)
+    return u + 0.5 * dt * (v + v_1), v + 0.5 * dt * (a + a_1), u, v, a
+
+
+def step_of_dahlquist(state, t, dt, p, acceleration):
+    """Make a step of the explicit method of two steps of the highest order, whose parasitic root is -5."""
+    u, v, u_before, v_before, a_before = state
+    a = acceleration(u, v, t, p)
+    x = 5.0 * u_before - 4.0 * u + dt * (4.0 * v + 2.0 * v_before)
+    w = 5.0 * v_before - 4.0 * v + dt * (4.0 * a + 2.0 * a_before)
+    return (x, w, u, v, a), v
+
+
+@pytest.mark.parametrize("levels", [[5, 6, 7], [9, 10, 11]])
+def test_finer_levels_are_not_advised_where_they_grow_more(levels):
+    stepper = Stepper(start_by_heun, step_of_dahlquist)
+    scheme = Scheme(
+        kind="dahlquist",
+        title="of a test",
+        source="Hairer, Norsett and Wanner I, section III.3",
+        family="multistep",
+        stepper=lambda options: stepper,
+        orders=lambda options: same_orders(3),
+    )
+    assert not theory.is_zero_stable(stepper)
+    found = judged(scheme, levels, {"converges": "u", "order": 3}, {"stable": True})
+    assert [v.status == "PASS" for v in found] == [False, False]
+    for verdict in found:
+        assert "Finer levels will not help" in verdict.advice
+        assert "or finer" not in verdict.advice
+
+
+def test_every_scheme_of_vibsim_is_zero_stable():
+    assert all(theory.is_zero_stable(s.stepper(s.defaults())) for s in FIXED_STEP.values())

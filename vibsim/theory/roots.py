@@ -23,7 +23,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from vibsim.core.array_types import Complexes, Flags, Floats
 from vibsim.elementary import on_arrays
-from vibsim.schemes.base import Options, Scheme, Stepper
+from vibsim.schemes.base import UNIT_ROUND_OFF, Options, Scheme, Stepper
 from vibsim.theory.arithmetic import bairstow, characteristic
 from vibsim.theory.basis import UnitSteps, decimal, unit_steps, where_it_ends
 from vibsim.theory.doubled import Doubled, doubled, root, stacked
@@ -46,6 +46,11 @@ _BESIDE = 1e-6
 """Relative distance from a limit within which a root that crosses the unit circle does so."""
 _CROSSED = 1e-8
 """Least growth and decay at the ends of that interval for a crossing, as opposed to a root that stays on the circle."""
+
+_TINY = 1e-3
+"""A value of p that stands for the limit of vanishing steps."""
+_BELOW = np.array([0.75, 0.9])
+"""Parts of the limit where growth that only sinks below the round-off is still seen in double-double."""
 
 
 @dataclass(frozen=True)
@@ -251,10 +256,21 @@ def stability_limit(scheme: Scheme, options: Options) -> float:
 
     Below the limit no root is outside the unit circle. At the limit itself the amplitude may grow linearly, if two
     roots meet. If there are several intervals of stability, it is the end of the first. Adaptive schemes have none.
+    A growth per step of less than the round-off of double precision, 1.1e-16, is none: no run can distinguish it from
+    1. A growth that sinks below it with w dt, and does not turn into decay, is one at every step.
     """
     if scheme.adaptive:
         return float(np.inf)
     return _limit(scheme.stepper(options))
+
+
+@lru_cache(maxsize=1024)
+def is_zero_stable(stepper: Stepper) -> bool:
+    """Tell whether the growth per step vanishes with dt; otherwise shorter steps overflow sooner.
+
+    A consistent step without parasitic roots outside the unit circle grows by ``O(p^2)``.
+    """
+    return not bool(_largest(stepper, np.array([_TINY]))[0] > _TINY)
 
 
 @lru_cache(maxsize=1024)
@@ -268,6 +284,8 @@ def _limit(stepper: Stepper) -> float:
     limit = _first(partial(_grows, stepper), grid[growing[0] - 1], grid[growing[0]])
     low, high = limit * (1.0 - _BESIDE), limit * (1.0 + _BESIDE)
     below, above = _largest(stepper, np.array([low, high]))
+    if above <= _CROSSED and np.all(_largest(stepper, limit * _BELOW) > 0.0):
+        return 0.0
     if not (below < -_CROSSED and above > _CROSSED):
         return limit
     return _first(lambda p: ~(_largest(stepper, p) <= 0.0), low, high)
@@ -290,10 +308,10 @@ def _largest(stepper: Stepper, p: Floats) -> Floats:
 
 
 def _grows(stepper: Stepper, p: Floats) -> Flags:
-    """Tell for which p a root is outside the unit circle by more than rounding in double-double."""
+    """Tell for which p a root is outside the unit circle by more than rounding, of a run or in double-double."""
     found = roots(stepper, p)
     rounding = 1e-28 * (1.0 + p * p)
     # near a double root, rounding enters with its square root
-    rounding = np.where(found.is_complex, rounding, np.sqrt(rounding))
-    is_principal = ~(found.log_growth <= rounding)
+    least = np.where(found.is_complex, np.maximum(rounding, UNIT_ROUND_OFF), np.sqrt(rounding))
+    is_principal = ~(found.log_growth <= least)
     return is_principal | ~(found.parasitic <= 1.0 + _PARASITIC)
