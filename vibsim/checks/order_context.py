@@ -163,6 +163,11 @@ class OrderContext:
         return float(fastest(self._facts.record)[place])
 
     @cached_property
+    def is_zero_stable(self) -> bool:
+        """Whether finer levels grow less, as those of every useful scheme do."""
+        return self._facts.is_zero_stable
+
+    @cached_property
     def limit(self) -> float:
         """The largest stable w dt of the scheme, infinite for none; NaN if no level failed."""
         return math.nan if self.culprit < 0 else self._facts.stability_limit

@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 from vibsim.checks.phase_amplitude_text import NO_PART, PART_ADVICE
-from vibsim.checks.sentences import WRONG_LIMIT_ADVICE
+from vibsim.checks.sentences import NOT_ZERO_STABLE, WRONG_LIMIT_ADVICE
 
 Words = Mapping[str, tuple[str, str]]
 """Diagnosis to the templates of sentence and advice."""
@@ -51,6 +51,10 @@ DIAGNOSES: Words = {
         "{scheme}{of_limit}. Level {first_stable} is the first within it.{growth_in_words}",
         START_FINER,
     ),
+    "unstable, at every step": (
+        "{subject} is unstable. The solution grows where the exact one does not.",
+        NOT_ZERO_STABLE,
+    ),
     "unstable": (
         "{subject} is unstable. The solution grows where the exact one does not, and finer levels do not cure this.",
         START_FINER,
@@ -60,6 +64,7 @@ DIAGNOSES: Words = {
         "Check the formulas of `model:` at t = 0, and `initial:`. Something has no finite value there. A quotient of "
         "two zeros needs a condition, such as sin(t)/t if t > 0 else 1.",
     ),
+    "non_finite, at every step": (NOT_FINITE, NOT_ZERO_STABLE),
     "non_finite, always": (
         NOT_FINITE,
         "End the time interval (`time: end`) before t = {singular:4}, or check the formulas of `model:`. Finer levels "

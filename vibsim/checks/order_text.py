@@ -52,9 +52,15 @@ def _diagnosis(s: OrderContext) -> str:
     """Return the first diagnosis that applies: from the options of the scheme or the force, then from the cause."""
     by_cause, corner = f"{s.reason}, {s.cause}", s.corner
     has_promise, less = s.shows_promise, s.promises_less
+    may_grow = s.reason in ("unstable", "non_finite") and s.singular != 0.0
+    always_grows = may_grow and not s.is_zero_stable
     finer = {
-        "unstable": {"beyond the limit": s.is_beyond_limit},
-        "non_finite": {"from the start": s.singular == 0.0, "always": not math.isnan(s.singular)},
+        "unstable": {"at every step": always_grows, "beyond the limit": s.is_beyond_limit},
+        "non_finite": {
+            "from the start": s.singular == 0.0,
+            "at every step": always_grows,
+            "always": not math.isnan(s.singular),
+        },
         "not_applicable": {
             "adaptive": "tolerance" in s.options,
             "part": is_error_part(s.quantity),

@@ -11,6 +11,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from vibsim import theory
 from vibsim.apriori.stability_limits import stability_limits
 from vibsim.checks.fields import field_values, name_of
 from vibsim.checks.notation import PLAIN, Notation
@@ -144,12 +145,25 @@ class MemberFacts:
         last = of_levels[-LEVELS_OF_AN_ORDER:]
         return float(np.max(last) / np.min(last)) if np.min(last) > 0.0 else math.nan
 
+    @property
+    def is_zero_stable(self) -> bool:
+        """Whether the growth per step vanishes with dt, so that finer levels help; also of an adaptive scheme."""
+        method = self.experiment.schemes[self.scheme].method
+        return method.adaptive or theory.is_zero_stable(method.stepper(self.options))
+
     @cached_property
     def failed_at(self) -> float:
         """Time at which the level of the check produced a number that is not finite; NaN if it did not."""
         place = self.scheme, self.case, self.record.place("level", self.fact("level"))
         failed = self.record["status"][place]
         return float(self.record["failure_time"][place]) if failed else math.nan
+
+
+NOT_ZERO_STABLE = (
+    "Correct the coefficients of scheme {scheme}, or name another. It is not zero-stable: it grows at every step by a "
+    "factor that does not tend to 1 with dt. Finer levels will not help, because more steps overflow sooner."
+)
+"""Advice on a scheme that no step makes stable."""
 
 
 def growth_in_words(f: MemberFacts, predicted: float, measured: float) -> str:

@@ -22,7 +22,7 @@ import numpy as np
 from vibsim.checks.fields import LEVEL, STATUS, Field, Measured
 from vibsim.checks.notation import ROUND_OFF
 from vibsim.checks.outcome import Judged
-from vibsim.checks.sentences import Description, MemberFacts, growth_in_words
+from vibsim.checks.sentences import NOT_ZERO_STABLE, Description, MemberFacts, growth_in_words
 from vibsim.comparison.quantity_comparison import Compared
 from vibsim.convergence.reasons import FAIL, INCONCLUSIVE, PASS, STATUS_OF, code, first_reason
 from vibsim.convergence.thresholds import (
@@ -254,6 +254,8 @@ def _advice(f: MemberFacts, level: int, w_dt: float, time: str) -> str:
             "Take another `kind:` in `schemes:`, or look for an error in this one, which does not grow as its own "
             "theory predicts."
         )
+    if not f.is_zero_stable:
+        return NOT_ZERO_STABLE.format(scheme=f.scheme_name)
     limit = f.stability_limit
     if math.isfinite(limit) and math.isfinite(w_dt) and w_dt > limit:
         return (
