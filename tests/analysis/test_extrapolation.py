@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Iterator
+from dataclasses import replace
 from typing import Any
 
 import mpmath
@@ -17,7 +18,7 @@ from vibsim.convergence.extrapolation.states import FLOATS, Circumstances, best_
 from vibsim.core.record import Record, Variable
 from vibsim.engine import integrate
 from vibsim.experiment import Experiment
-from vibsim.ladder import climb
+from vibsim.ladder import best, climb
 from vibsim.models import MODELS
 from vibsim.schemes import SCHEMES
 from vibsim.simulation import simulate_record
@@ -183,6 +184,53 @@ def test_the_bound_holds_and_is_not_far_too_large() -> None:
 def test_the_bound_holds_over_many_ladders() -> None:
     bounds, errors, _ = measured(7, 600)
     assert np.mean(errors <= bounds) >= 0.999
+
+
+@pytest.mark.parametrize("model", ["pendulum", "linear_pendulum"])
+@pytest.mark.parametrize(
+    ("kind", "changes"),
+    [
+        ("velocity_verlet", {"even_powers": False}),
+        ("crank_nicolson", {"even_powers": False}),
+        ("gauss4", {"even_powers": False}),
+        ("generalized_alpha", {}),
+        ("hht", {}),
+    ],
+)
+def test_the_bound_holds_where_some_powers_are_missing_or_small(
+    kind: str, changes: dict[str, bool], model: str
+) -> None:
+    """A symmetric scheme that does not say so, and schemes whose odd powers have small coefficients."""
+    scheme = replace(SCHEMES[kind], **changes)
+    of = Method(MODELS[model], scheme, scheme.defaults())
+    members = start(np.array([0.3, 1.0, 2.0]), 0.3, parameters=len(of.model.parameters))
+    true = exact(of, members, 16)
+    held = []
+    for first in range(6, 11):
+        for count in range(3, min(7, 14 - first)):
+            steps = tuple(2**level for level in range(first, first + count))
+            found = climb(of, members, steps, 16, lane="scalar")
+            bounds, errors = bound_and_error(found, true)
+            held.append(errors <= bounds + 1e-13)
+    assert np.mean(held) >= 0.999
+
+
+def test_the_bound_holds_with_a_corrected_frequency_and_damping() -> None:
+    """Its start is not symmetric then: the damping of the first step is corrected, that of others is not."""
+    for levels in ([6, 7, 8, 9], [6, 7, 8, 9, 10], [7, 8, 9, 10, 11]):
+        experiment = Experiment(
+            model="oscillator",
+            parameters={"m": 1.0, "spring": "k*u", "damping": {"linear": 0.2}, "parameters": {"k": 4.0}},
+            initial={"u": 1.0, "v": 0.3},
+            time={"end": 10.0},
+            levels=levels,
+            schemes=[{"kind": "central", "frequency_correction": True, "end_velocity": "kick"}],
+        )  # fmt: skip
+        found = best(experiment)
+        t, w = found.t.values, np.sqrt(3.99)
+        true = np.exp(-0.1 * t) * (np.cos(w * t) + 0.4 / w * np.sin(w * t))
+        error = np.abs(found.u.values[0, 0] - true)
+        assert np.all(error <= found.u_error.values[0, 0] + 1e-14)
 
 
 @pytest.mark.parametrize("theta", [0.5, 1.0, 3.1])

@@ -224,6 +224,7 @@ def test_a_message_offers_what_is_in_memory() -> None:
         ({"model": replace(RAYLEIGH, parameters=[*RAYLEIGH.parameters])}, "write tuples"),
         ({"schemes": [replace(RALSTON, options=[])]}, "write tuples"),
         ({"schemes": [replace(RALSTON, adaptive=True)]}, "cannot be added"),
+        ({"schemes": [replace(RALSTON, even_powers=True)]}, "a step back does not undo a step"),
         ({"schemes": [replace(RALSTON, stepper=lambda options: None)]}, "its stepper must"),
         ({"schemes": [replace(RALSTON, orders=lambda options: 2)]}, "its orders must"),
     ],

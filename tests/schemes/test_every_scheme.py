@@ -9,6 +9,7 @@ import scheme_runs as runs_of
 from thinned import thinned
 
 from vibsim import Experiment, analyse, simulate, verdicts
+from vibsim.engine import integrate
 from vibsim.models import MODELS
 from vibsim.schemes import FIXED_STEP, SCHEMES, NumberOption
 from vibsim.schemes.base import LOW_STARTS, Orders
@@ -127,6 +128,63 @@ def test_the_error_expands_in_the_powers_that_the_scheme_says(scheme, model):
         ]
         errors = [np.max(np.abs(value - exact)) for value in best]
         assert np.log2(errors[-2] / errors[-1]) > left - 0.3
+
+
+DAMPED = tuple(
+    Experiment(
+        model="oscillator",
+        parameters={"m": 1.5, "spring": spring, "damping": {kind: 0.5}, "parameters": {"k": 2.0}},
+        initial={"u": 1.0},
+        time={"end": 1.0},
+        levels=[4],
+        schemes=["rk4"],
+    )
+    for spring, kind in (("k*u", "linear"), ("k*u + u**3", "linear"), ("k*u", "quadratic"))
+)
+"""With damping that centred schemes treat in a way of their own."""
+EXPANDED = [
+    pytest.param(scheme, options, model, id=f"{runs_of.name_of(scheme, options)}-{name}")
+    for name, model in (
+        *((m.kind, m) for m in runs_of.ALL_MODELS),
+        *zip(("damped", "damped_cubic", "drag"), (e.model.definition for e in DAMPED), strict=True),
+    )
+    for scheme in FIXED_STEP.values()
+    if scheme.treats(model)
+    for options in (
+        variant if own_end is None else {**variant, "end_velocity": own_end}
+        for variant in runs_of.variants(scheme)
+        for own_end in ((None, "kick") if "end_velocity" in variant else (None,))
+    )
+]
+
+
+@pytest.mark.parametrize(("scheme", "options", "model"), thinned(EXPANDED, 5))
+def test_no_choice_says_even_powers_that_levels_do_not_show(scheme, options, model):
+    """After one extrapolation the differences of levels fall with p + 2, at all times and at the last one."""
+    numbers = [p.default for p in model.parameters]
+    if model.damping is not None:
+        (e,) = (e for e in DAMPED if e.model.definition is model)
+        numbers = [e.model.parameters.get(p.name, p.default) for p in model.parameters]
+    order = scheme.formal_order(model.position, model, options)
+    levels = (6, 7, 8, 9) if order < 3 else (4, 5, 6, 7)
+    runs = [
+        integrate(
+            model, scheme, options, np.array([numbers]), np.array([[1.3, -0.7]]),
+            np.array([runs_of.END / 2**n]), 2**n, 2 ** (n - levels[0]),
+            lane="plain", with_gathered=False,
+        )
+        for n in levels
+    ]  # fmt: skip
+    for name, rows in (
+        (model.position, [run.position[0] for run in runs]),
+        (model.velocity, [run.velocity[0] for run in runs]),
+    ):
+        if not scheme.has_even_powers(name, model, options):
+            continue
+        p = scheme.formal_order(name, model, options)
+        best = [b + (b - a) / (2.0**p - 1.0) for a, b in itertools.pairwise(rows)]
+        changes = [np.max(np.abs(b - a)) for a, b in itertools.pairwise(best)]
+        assert np.log2(changes[-2] / changes[-1]) > p + 1.5, name
 
 
 @pytest.mark.parametrize(("scheme", "model"), SMOOTH)

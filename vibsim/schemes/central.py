@@ -281,10 +281,14 @@ def round_off(options: Options, steps: int) -> float:
 def even_powers(quantity: str, model: Model, options: Options) -> bool:
     """Tell whether the error of `quantity` has only even powers of dt (A, section 2.4).
 
-    The start must be centred and the damping linear; quantities of the velocity also need a centred one at the end.
+    The start must be centred and the damping linear; quantities of the velocity also need a centred one at the end. A
+    corrected frequency scales the velocity and the force of the start, but not the damping of the steps.
     """
     centred_end = quantity in model.positions or options["end_velocity"] == "kick"
-    centred_damping = model.damping is None or model.damping.kind == "linear"
+    corrected_start = bool(options.get("frequency_correction"))
+    centred_damping = model.damping is None or (
+        model.damping.kind == "linear" and not corrected_start
+    )
     return options["start"] not in LOW_STARTS and centred_end and centred_damping
 
 

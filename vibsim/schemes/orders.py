@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from functools import cache
 from typing import Any, Literal
 
+from vibsim.formula import held
 from vibsim.models.base import BUDGET, Model, tree
 
 ORDER_OF_WORK = 4.0
@@ -30,6 +31,16 @@ def is_autonomous(model: Model) -> bool:
     if model.loaded is not None:
         return not model.loaded.is_driven
     return "t" not in _names_in_acceleration(model)
+
+
+@cache
+def is_smooth(model: Model) -> bool:
+    """Tell whether the formulas of the acceleration have neither a corner nor a jump, such as that of ``abs(v)*v``."""
+    if model.loaded is not None:
+        return True
+    moving = {*(state.name for state in model.states), "t"}
+    _, switches = held((tree(model, formula) for formula in model.accelerations), moving)
+    return not switches
 
 
 def _names_in_acceleration(model: Model) -> frozenset[str]:

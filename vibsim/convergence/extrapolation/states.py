@@ -8,7 +8,9 @@ The error of an entry is estimated, besides round-off, as follows:
   of ``T[i][j-1]``. If changes fall by another factor, faster or slower, the entry is trusted less: `trust` is the worst
   agreement, a factor up to 1, over all columns of the row so far.
 - one more extrapolation reduces that error about as much as the last one did, times the cost of the coarser level, and
-  never below `LARGEST_GAIN` of it.
+  never below `LARGEST_GAIN` of it. If every power is taken to be there, some may be missing or small: the extrapolation
+  that should remove one then gains nothing, and the one before it much. So it counts as gaining no more than the worse
+  of the last two, and the second as gaining nothing.
 - if a finer row contradicts an entry, the error is at least the contradiction.
 
 The error is the larger of du and dv/w, so that it is not small where one of them happens to cross zero. For the same
@@ -121,6 +123,7 @@ class Tableau:
     # Row i times the change of its level times ``1/(w end)^p`` is the response of the motion to a lasting relative
     # disturbance of its equation. (Central differences disturb it by ``(w h)^p / (2 (p+1)!)``.)
     amplification: tuple[float, ...]
+    has_every_power: bool  # whether the powers are p, p + 1, ..., some of which may be missing
 
 
 @lru_cache(maxsize=256)
@@ -135,7 +138,7 @@ def tableau(steps: tuple[int, ...], p: int, q: int, round_off: tuple[float, ...]
         2.0 * math.factorial(p + 1) * (1.0 + row[0].factor) * power(float(n), float(p))
         for row, n in zip(rows[1:], steps[:-1], strict=True)
     ]
-    return Tableau(rows, noise, tuple(amplification))
+    return Tableau(rows, noise, tuple(amplification), has_every_power=q == 1)
 
 
 class _Row(NamedTuple):
@@ -162,7 +165,7 @@ def best_entry(
     response: Any = 0.0
     noise = lasting = response
     for i, level in enumerate(levels[1:], start=1):
-        finer = _next_row(table.entries[i], level, row, facts, ops)
+        finer = _next_row(table, i, level, row, facts, ops)
         for j in range(1, i):
             # the error is at least the difference from the finer row
             bound = ops.larger(row.bounds[j - 1], finer.changes[j])
@@ -201,13 +204,15 @@ def _least(
 
 
 def _next_row(
-    entries: Sequence[Entry], level: Pair, row: _Row, facts: Circumstances, ops: Arithmetic
+    table: Tableau, i: int, level: Pair, row: _Row, facts: Circumstances, ops: Arithmetic
 ) -> _Row:
-    """Return the row of a level, with bounds that exclude round-off; `row` is the previous one."""
+    """Return row i, that of a level, with bounds that exclude round-off; `row` is the previous one."""
+    entries = table.entries[i]
     position, dx = next_row(entries, level[0], row.position)
     velocity, dy = next_row(entries, level[1], row.velocity)
     changes, bounds, lefts = list[Any](), list[Any](), list[Any]()
     trust: Any = 1.0
+    last_gain: Any = 1.0
     for j, entry in enumerate(entries):
         change = ops.so_far(ops.larger(abs(dx[j]), abs(dy[j]) / facts.rate)) + _TINY
         changes.append(change)
@@ -229,7 +234,9 @@ def _next_row(
                 th.GAIN_SAFETY if len(entries) > 2 or entry.change_fall else th.FIRST_GAIN_SAFETY
             )
             gain = safety * entry.coarser * left / (lefts[-1] * trust)
-            bound = bound * ops.larger(ops.smaller(gain, 1.0), th.LARGEST_GAIN)
+            believed = ops.larger(gain, last_gain) if table.has_every_power else gain
+            bound = bound * ops.larger(ops.smaller(believed, 1.0), th.LARGEST_GAIN)
+            last_gain = gain
             bounds[-1] = ops.larger(entry.factor * change, bounds[-1])
         lefts.append(left)
         bounds.append(bound / (trust * trust + _TINY))
