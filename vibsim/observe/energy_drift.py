@@ -106,7 +106,8 @@ def drift_at(block: MemberBlock, level: int, name: str = "energy_deviation") -> 
     periods = np.where(np.isnan(w), end / exact, w * end / (2.0 * np.pi))
     found = drift_of(running, ratio, initial, floor, periods, deviation)
     # the period of a large swing is not that of small oscillations
-    longer = np.where(np.isnan(w * exact) | block.model.linear, 1.0, w * exact / (2.0 * np.pi))
+    is_other = np.isfinite(w * exact) & (not block.model.linear)
+    longer = np.where(is_other, w * exact / (2.0 * np.pi), 1.0)
     factor = np.where(found.kind == QUADRATIC, longer**2, longer)
     return replace(found, rate=found.rate * factor)
 

@@ -150,3 +150,8 @@ def test_a_drift_is_per_period_of_the_motion() -> None:
     lost = -level.energy_deviation.values[0, 0, -1] / level.energy_initial.values.item()
     per_period = lost * level.exact_period.values.item() / 400.0
     assert verdict.results[0].facts["drift_rate"] == pytest.approx(per_period, rel=0.1)
+
+
+def test_a_motion_that_never_returns_has_a_drift_without_a_warning() -> None:
+    told = found("rk4", 10, theta=0.0, omega=2.0)
+    assert told["none"] == ("FAIL", "mismatch")
