@@ -14,6 +14,7 @@ from vibsim.apriori.formal_orders import (
     orders_on_oscillator,
     special_orders,
 )
+from vibsim.apriori.roundoff_floor import norm_of_floor
 from vibsim.comparison import thresholds as th
 from vibsim.comparison.rescaled_differences import coincidence
 from vibsim.convergence import differences
@@ -21,6 +22,7 @@ from vibsim.convergence.extrapolation.series import extrapolate_series
 from vibsim.convergence.thresholds import ROUND_OFF_SAFETY
 from vibsim.convergence.verdict import Judgement
 from vibsim.core.array_types import Flags, Floats
+from vibsim.core.vocabulary import TYPICAL_NORM
 from vibsim.observe.member_block import MemberBlock, by_level
 
 
@@ -146,11 +148,16 @@ class Comparison:
 
     @cached_property
     def beyond_the_bound(self) -> Floats:
-        """Largest distance of the extrapolated series from the exact one; 0 where its bound may allow it."""
+        """Largest distance of the extrapolated series from the exact one; 0 where its bound may allow it.
+
+        If storage is bounded it is the root mean square.
+        """
         if self.exact is None:
             return np.zeros(self.block.shape)
+        norm = TYPICAL_NORM if self.block.lean else "linf"
+        size = norm_of_floor(np.ones(1), norm, self.points, self.block.grid.spacing)
         with np.errstate(invalid="ignore", over="ignore"):
-            distance = differences.largest(self.extrapolation[0] - self.exact)
+            distance = self.in_norm(norm).extrapolation / size
             allowed = th.WRONG_LIMIT * (self.largest_bound + self.blur[..., -1])
             return np.where(distance > allowed, distance, 0.0)
 

@@ -86,7 +86,7 @@ SHARD_BYTES = 320 * 10**6
 LARGEST_SHARD = 2**20
 """Largest number of members of a shard."""
 
-ANALYSIS_MEMORY = 180 * 10**6
+ANALYSIS_MEMORY = 190 * 10**6
 """Bytes of an analysis without its arrays, including LLVM and the supervising process."""
 ANALYSIS_FACTOR = 3.8
 """Peak memory of an analysis over the bytes that it reads for one block of members."""

@@ -170,15 +170,15 @@ def test_every_verdict_occurs_and_says_the_finding() -> None:
     assert (status, reason) == ("PASS", "match")
     head = f"The largest amplitude over 11 members is 2.500000001 m, at {KEY} = 1, with an error of at most"
     assert text.startswith(head)
-    assert text.endswith("; it is below 3.")
+    assert text.endswith("; it is below 3 m.")
     status, reason, text, advice = words_of("largest", below=1)
     assert (status, reason) == ("FAIL", "mismatch")
-    assert text.endswith("; it is not below 1.")
+    assert text.endswith("; it is not below 1 m.")
     assert advice == "Change `below:`, `model:` or `sweep:`."
     status, reason, text, advice = words_of("largest", equals=2.5, atol=1e-9)
     assert (status, reason) == ("INCONCLUSIVE", "pre_asymptotic")
     assert (
-        "; it may or may not be equal to 2.5 within 1e-09, because 1 of 11 members is not " in text
+        "; it may or may not be equal to 2.5 within 1e-09 m, because 1 of 11 members is not " in text
     )
     assert text.endswith(f" resolved well enough ({KEY} = 1).")
     assert advice.startswith("Add levels 10 and 11 to `levels:` (")
