@@ -23,7 +23,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from vibsim.core.array_types import Complexes, Flags, Floats
 from vibsim.elementary import on_arrays
-from vibsim.schemes.base import UNIT_ROUND_OFF, Options, Scheme, Stepper
+from vibsim.schemes.base import Options, Scheme, Stepper
 from vibsim.theory.arithmetic import bairstow, characteristic
 from vibsim.theory.basis import UnitSteps, decimal, unit_steps, where_it_ends
 from vibsim.theory.doubled import Doubled, doubled, root, stacked
@@ -42,6 +42,8 @@ _FAR = np.geomspace(GRID[-1], 1e8, 101)[1:]
 """Further values of p for implicit schemes: the limit of Newmark's scheme tends to infinity as beta tends to 1/4."""
 _PARASITIC = 1e-9
 """Growth of a parasitic root above which it is not rounding."""
+_UNSEEN = 1e-11
+"""Growth per step that decides nothing: what an iteration in a step leaves, a factor of 1.01 in 10^9 steps."""
 _BESIDE = 1e-6
 """Relative distance from a limit within which a root that crosses the unit circle does so."""
 _CROSSED = 1e-8
@@ -50,7 +52,7 @@ _CROSSED = 1e-8
 _TINY = 1e-3
 """A value of p that stands for the limit of vanishing steps."""
 _BELOW = np.array([0.75, 0.9])
-"""Parts of the limit where growth that only sinks below the round-off is still seen in double-double."""
+"""Parts of the limit where growth that only sinks below `_UNSEEN` is still seen in double-double."""
 
 
 @dataclass(frozen=True)
@@ -256,8 +258,8 @@ def stability_limit(scheme: Scheme, options: Options) -> float:
 
     Below the limit no root is outside the unit circle. At the limit itself the amplitude may grow linearly, if two
     roots meet. If there are several intervals of stability, it is the end of the first. Adaptive schemes have none.
-    A growth per step of less than the round-off of double precision, 1.1e-16, is none: no run can distinguish it from
-    1. A growth that sinks below it with w dt, and does not turn into decay, is one at every step.
+    A growth per step below 1e-11 is none, as an iteration leaves it. A growth that sinks below it with w dt, and does
+    not turn into decay, is one at every step.
     """
     if scheme.adaptive:
         return float(np.inf)
@@ -312,6 +314,6 @@ def _grows(stepper: Stepper, p: Floats) -> Flags:
     found = roots(stepper, p)
     rounding = 1e-28 * (1.0 + p * p)
     # near a double root, rounding enters with its square root
-    least = np.where(found.is_complex, np.maximum(rounding, UNIT_ROUND_OFF), np.sqrt(rounding))
+    least = np.where(found.is_complex, np.maximum(rounding, _UNSEEN), np.sqrt(rounding))
     is_principal = ~(found.log_growth <= least)
     return is_principal | ~(found.parasitic <= 1.0 + _PARASITIC)
