@@ -31,6 +31,7 @@ from vibsim.core.errors import (
 from vibsim.experiment.schema.unit_text import UnitError
 from vibsim.formula import ExpressionError
 from vibsim.native.source import NativeError
+from vibsim.schemes.step_numbers import EndlessStepError
 
 FAULTS = [
     Fault("b.yaml", 3, "model.g", "-1", "must be positive", "write 9.81"),
@@ -47,6 +48,7 @@ ERRORS = [
     ExpressionError("a b", 2, "expected an operator", "write a*b"),
     UnitError("unknown unit", "did you mean 'm'?"),
     UnitError("unknown unit"),
+    EndlessStepError("a loop of the step does not end"),
 ]
 COPIES: list[Callable[[Any], Any]] = [deepcopy, lambda item: pickle.loads(pickle.dumps(item))]
 

@@ -164,7 +164,7 @@ def test_no_choice_says_even_powers_that_levels_do_not_show(scheme, options, mod
     numbers = [p.default for p in model.parameters]
     if model.damping is not None:
         (e,) = (e for e in DAMPED if e.model.definition is model)
-        numbers = [e.model.parameters.get(p.name, p.default) for p in model.parameters]
+        numbers = [e.model.parameters[p.key] for p in model.parameters]
     order = scheme.formal_order(model.position, model, options)
     levels = (6, 7, 8, 9) if order < 3 else (4, 5, 6, 7)
     runs = [

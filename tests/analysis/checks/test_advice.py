@@ -211,6 +211,7 @@ def story(**changes: Any) -> _Phrases:
         "parts_at": math.nan,
         "special": math.nan,
         "on_oscillator": math.inf,
+        "is_zero_stable": True,
         "centred": math.nan,
         "has_promise": True,
         "table_corner": math.nan,

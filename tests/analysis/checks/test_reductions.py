@@ -178,7 +178,8 @@ def test_every_verdict_occurs_and_says_the_finding() -> None:
     status, reason, text, advice = words_of("largest", equals=2.5, atol=1e-9)
     assert (status, reason) == ("INCONCLUSIVE", "pre_asymptotic")
     assert (
-        "; it may or may not be equal to 2.5 within 1e-09 m, because 1 of 11 members is not " in text
+        "; it may or may not be equal to 2.5 within 1e-09 m, because 1 of 11 members is not "
+        in text
     )
     assert text.endswith(f" resolved well enough ({KEY} = 1).")
     assert advice.startswith("Add levels 10 and 11 to `levels:` (")
