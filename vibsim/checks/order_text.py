@@ -326,8 +326,8 @@ class _Phrases(OrderContext):
 
     def hidden(self) -> str:
         """Say which promised power may dominate on finer levels, as near a special case; empty if there is none."""
-        if self.on_oscillator < self.promised:
-            return self.in_theory()
+        if found := self.in_theory():
+            return found
         if not self.promised + HALF_SPACING < min(self.order, self.special):
             return ""
         return (
@@ -341,8 +341,8 @@ class _Phrases(OrderContext):
             return ""
         found, promised = map(self.notation.number, (self.on_oscillator, self.promised))
         return (
-            f" Scheme {self.scheme} has order {found} on u'' + w^2 u = 0 in exact arithmetic, not {promised} as it "
-            "promises."
+            f" Scheme {self.scheme} promises order {promised}, but without rounding it has order {found} on "
+            "u'' + w^2 u = 0."
         )
 
     def likely(self) -> float:
