@@ -5,6 +5,7 @@ import math
 import pytest
 
 from vibsim import Experiment, analyse, simulate, theory, verdicts
+from vibsim.cli.commands.theory import theory_rows
 from vibsim.core.errors import VibsimError
 from vibsim.schemes import FIXED_STEP, Scheme, Stepper
 from vibsim.schemes.code_generation import self_starting
@@ -121,6 +122,54 @@ def test_growth_that_no_run_can_see_is_no_instability(step, order, limit):
     assert theory.stability_limit(scheme, {}) == pytest.approx(limit, rel=1e-9)
     checks = {"converges": "u", "order": order}, {"stable": True}
     assert [v.status for v in judged(scheme, [6, 7, 8], *checks)] == ["PASS", "PASS"]
+
+
+OUTER, INNER = 1.3512071919596578, -1.7024143839193153
+
+
+def suzuki_yoshida(state, t, dt, p, acceleration):
+    """Make a step of order 4 from coefficients of 16 digits, whose sum is 1 only to rounding."""
+    u, v = state
+    for c in (OUTER, INNER, OUTER):
+        u = u + 0.5 * c * dt * v
+        v = v + c * dt * acceleration(u, v, t, p)
+        u = u + 0.5 * c * dt * v
+    return (u, v), state[1]
+
+
+def test_coefficients_of_16_digits_have_the_series_of_the_exact_ones():
+    mine, exact = own(suzuki_yoshida), FIXED_STEP["yoshida4"]
+    rows = [dict(theory_rows(scheme, scheme.defaults(), 3)) for scheme in (mine, exact)]
+    names = ("amplitude", "frequency", "phase")
+    assert [rows[0][name] for name in names] == [rows[1][name] for name in names]
+    checks = [{"converges": f"u_{part}_error", "order": 4} for part in ("phase", "amplitude")]
+    for verdict in judged(mine, [7, 8, 9], *checks):
+        assert verdict.status == "PASS"
+
+
+def test_a_step_that_compares_numbers_has_no_series_and_the_order_of_its_position():
+    scheme = own(until_small)
+    with pytest.raises(theory.NoSeriesError, match="compares numbers"):
+        theory.part_orders(scheme.stepper({}), 0.0, 1.0, 0.0)
+    assert dict(theory_rows(scheme, {}, 3))["formulas"].startswith("not written: the step compares")
+    (verdict,) = judged(scheme, [6, 7, 8], {"converges": "u_phase_error", "order": "scheme"})
+    assert verdict.status == "PASS"
+
+
+def until_both_agree(state, t, dt, p, acceleration):
+    """Solve the equations of the midpoint rule by iteration."""
+    u, v = state
+    x, w, change = u, v, 1.0
+    while change > 1e-13:
+        a = acceleration(0.5 * (u + x), 0.5 * (v + w), t + 0.5 * dt, p)
+        y, z = u + 0.5 * dt * (v + w), v + dt * a
+        change = abs(y - x) + abs(z - w)
+        x, w = y, z
+    return (x, w), v
+
+
+def test_the_rounding_of_an_iteration_is_no_growth_at_every_step():
+    assert 1.0 < theory.stability_limit(own(until_both_agree), {}) < 2.0
 
 
 def start_by_heun(variant, u, v, dt, p, acceleration):

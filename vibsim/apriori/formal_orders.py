@@ -7,6 +7,7 @@ They depend on the options of the scheme, which may be swept, and those of some 
 from __future__ import annotations
 
 import math
+from contextlib import suppress
 from typing import get_args
 
 import numpy as np
@@ -137,7 +138,8 @@ def is_promised(experiment: Experiment, quantity: str) -> bool:
 def part_orders(experiment: Experiment, quantity: str, columns: Columns) -> Floats:
     """Return the order of an error part for which `is_promised` holds, shape (scheme, 1 or case).
 
-    It is infinite where the part is exact, and NaN where nothing oscillates or the scheme chooses its own steps.
+    It is infinite where the part is exact, and NaN where nothing oscillates or the scheme chooses its own steps. Where
+    a step has no series, it is that of the position.
     """
     model = experiment.model.definition
     size = len(next(iter(columns.values()))) if columns else 1
@@ -152,10 +154,12 @@ def part_orders(experiment: Experiment, quantity: str, columns: Columns) -> Floa
             damping = motion.damping[cases]
             for value in np.unique(damping[np.isfinite(damping)]).tolist():
                 subset = cases[damping == value]
-                both = theory.part_orders(
-                    stepper, value, motion.position[subset], motion.velocity[subset]
-                )
-                orders[s, subset] = both[0 if quantity.endswith(PHASE) else 1]
+                orders[s, subset] = spec.method.formal_order(whole_of(quantity), model, options)
+                with suppress(theory.NoSeriesError):
+                    both = theory.part_orders(
+                        stepper, value, motion.position[subset], motion.velocity[subset]
+                    )
+                    orders[s, subset] = both[0 if quantity.endswith(PHASE) else 1]
     return orders
 
 

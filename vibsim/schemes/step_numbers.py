@@ -158,4 +158,4 @@ class Plain(Arithmetic):
         return Plain(size * math.copysign(1.0, divisor))
 
     def __abs__(self) -> Plain:
-        return Plain(abs(self.nearest))
+        return self if self >= 0.0 else -self

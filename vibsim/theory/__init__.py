@@ -4,6 +4,7 @@ On the linear problem ``u'' + g w u' + w^2 u = 0``, `vibsim.theory.basis` runs t
 everything else follows from the resulting matrix. On polynomials, `vibsim.theory.polynomial` runs them on exact series.
 """
 
+from vibsim.theory.basis import NoSeriesError
 from vibsim.theory.degrees import Miss, Residual, exact_degree, fitted_force, miss, reproduces
 from vibsim.theory.discrete import discrete, orders
 from vibsim.theory.phase_amplitude import part_orders
@@ -22,6 +23,7 @@ from vibsim.theory.rounding import rounding_bound
 __all__ = [
     "Amplification",
     "Miss",
+    "NoSeriesError",
     "Residual",
     "Roots",
     "amplification",

@@ -25,6 +25,7 @@ from vibsim.formula import Binary, Call, Expression, Name, Negate, Number, parse
 from vibsim.formula.tree import OPERATORS
 from vibsim.schemes.base import Stepper, handed
 from vibsim.schemes.code_generation import exact_names
+from vibsim.schemes.newton import solved, solved_together
 from vibsim.schemes.step_numbers import MOST_COMPARISONS, EndlessStepError, Plain, counting
 from vibsim.theory.doubled import Doubled
 
@@ -43,6 +44,10 @@ _DIGITS = 60
 _ROOT = ELEMENTARY["sqrt"].full
 """The only elementary function that steps call; it contains no coefficients."""
 _NONE: Substitutes = MappingProxyType({})
+
+
+class NoSeriesError(ValueError):
+    """A step without series about ``w dt = 0``, or whose frequency tends to another one than w."""
 
 
 @dataclass(frozen=True)
@@ -159,6 +164,45 @@ def _ends(stepper: Stepper, p: float) -> bool:
     except EndlessStepError:
         return False
     return True
+
+
+@lru_cache(maxsize=256)
+def require_formula(stepper: Stepper) -> None:
+    """Raise `NoSeriesError` if the step or the start of a scheme compares numbers or takes an absolute value.
+
+    The equation of an implicit step does not count: on a linear problem it has a formula as its solution.
+    """
+
+    def read(formula: str) -> Plain:
+        return Plain(float(decimal(formula)))
+
+    try:
+        unit_steps(stepper, Plain(SMALL), Plain(0.0), read, substitutes=LINEAR, most=0)
+    except EndlessStepError:
+        raise NoSeriesError("the step compares numbers, so that it is not one formula") from None
+
+
+def _solved(
+    x: Any, u: Any, d_u: Any, v: Any, d_v: Any, t: Any, p: Any, acceleration: Any, slopes: Any
+) -> Any:
+    """Solve the equation of `vibsim.schemes.newton.solved` for a linear force."""
+    by_u, by_v = slopes(u, v, t, p)
+    return acceleration(u, v, t, p) / (1.0 - (d_u * by_u + d_v * by_v))
+
+
+def _solved_together(
+    x: Any, y: Any, u: Any, d_u: Any, v: Any, d_v: Any, t: Any, p: Any, acceleration: Any, slopes: Any
+) -> Any:  # fmt: skip
+    """Solve the equations of `vibsim.schemes.newton.solved_together` for a linear force."""
+    one, two = (acceleration(u[i], v[i], t[i], p) for i in range(2))
+    by_u, by_v = slopes(u[0], v[0], t[0], p)
+    a, b, c, d = (by_u * i + by_v * j for i, j in zip(d_u, d_v, strict=True))
+    bottom = (1.0 - a) * (1.0 - d) - b * c
+    return (one * (1.0 - d) + b * two) / bottom, (two * (1.0 - a) + c * one) / bottom
+
+
+LINEAR: Substitutes = MappingProxyType({solved: _solved, solved_together: _solved_together})
+"""Solutions of the equations of implicit steps for a linear force."""
 
 
 def rebound(

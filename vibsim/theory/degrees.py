@@ -23,7 +23,7 @@ from typing import Any
 
 from vibsim.models.base import Model
 from vibsim.schemes.base import Stepper
-from vibsim.theory.laurent import Laurent
+from vibsim.theory.laurent import ROUNDED, Laurent
 from vibsim.theory.polynomial import (
     Course,
     Forces,
@@ -39,8 +39,6 @@ KNOWN_POWERS = 12
 """Power of dt at which residuals are truncated: twice that of any scheme at these degrees."""
 FOLLOWED_STEPS = 4
 """Number of steps for which a polynomial must be reproduced: more than any scheme carries points."""
-ROUNDED = 1e-13
-"""Size below which a term is a rounding error: some schemes state their coefficients to 16 decimals."""
 OF = ("position", "velocity", "state")
 State = tuple[Laurent, ...]
 

@@ -5,6 +5,10 @@ numbers, algebraic numbers, or rational functions of symbols. A series carries i
 propagate it. Comparisons only need the sign of the leading coefficient, which `Field.value` evaluates at one point.
 SymPy is imported on first use.
 
+The coefficients of a scheme may be decimals of 16 digits. They satisfy the conditions of its order to rounding, and
+exact numbers would show what is left as an error of a lower order. For them the domain is the real numbers
+(`in_reals`), where a coefficient below `ROUNDED` is 0.
+
 The equation of an implicit step, ``x = a(u + d_u x, v + d_v x, t)``, is solved by fixed-point iteration until x no
 longer changes. The factors d_u and d_v, or the force, begin with h, so every iteration adds a correct power, and the
 series is the unique solution near the current acceleration.
@@ -26,6 +30,10 @@ from vibsim.schemes.step_numbers import Arithmetic
 from vibsim.theory.basis import exact, fraction_of, reads
 
 HALF = Fraction(1, 2)
+ROUNDED = 1e-13
+"""Largest coefficient that is taken for the rounding of decimals of 16 digits."""
+_BITS = 128
+"""Precision of real coefficients."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -38,6 +46,12 @@ class Field:
     """Power of h at which every series is truncated."""
     at_point: Callable[[Any], float] | None = None
     """Function that evaluates an element with symbols at one point; None without symbols."""
+
+    def cleaned(self, coefficients: Sequence[Any]) -> Sequence[Any]:
+        """Return coefficients without those that are rounding."""
+        if self.domain.is_Exact:
+            return coefficients
+        return [c if abs(c) > ROUNDED else self.domain.zero for c in coefficients]
 
     def number(self, fraction: Fraction) -> Any:
         """Convert a fraction to an element."""
@@ -70,6 +84,9 @@ class Laurent(Arithmetic):
     """Power of h of the first coefficient."""
     coefficients: Sequence[Any]
 
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "coefficients", self.field.cleaned(self.coefficients))
+
     @property
     def end(self) -> int:
         """The first unknown power."""
@@ -80,6 +97,11 @@ class Laurent(Arithmetic):
         """Power and coefficient of the leading term; None if all known coefficients are 0."""
         terms = ((self.first + k, c) for k, c in enumerate(self.coefficients) if c)
         return next(terms, None)
+
+    @property
+    def vanishes(self) -> bool:
+        """Whether the series tends to 0 with h."""
+        return self.leading is None or self.leading[0] > 0
 
     @property
     def nearest(self) -> float:
@@ -131,21 +153,25 @@ class Laurent(Arithmetic):
         return self * Laurent(self.field, -power, inverse)
 
     def __pow__(self, exponent: int | Fraction) -> Laurent:
-        """Return a nonnegative integer power, or by Miller's recurrence any power of a series that begins with 1."""
+        """Return a nonnegative integer power, or by Miller's recurrence any power of a series that begins with 1.
+
+        A series of reals may begin with any positive number.
+        """
         if exponent >= 0 and exponent == int(exponent):
             return math.prod([self] * int(exponent), start=self.lift(1.0))
         domain = self.field.domain
-        if self.leading != (0, domain.one):
+        power, begin = self.leading or (0, domain.zero)
+        if power != 0 or (begin != domain.one if domain.is_Exact else not begin > 0):
             raise ValueError("the root of a series is taken where it begins with 1")
         a, e = [self.at(k) for k in range(self.end)], self.field.number(Fraction(exponent))
-        result = [domain.one]
+        result = [begin if domain.is_Exact else begin**e]
         for k in range(1, len(a)):
             terms = (
                 (e * j - domain.one * (k - j)) * a[j] * result[k - j]
                 for j in range(1, k + 1)
                 if a[j]
             )
-            result.append(sum(terms, domain.zero) / k)
+            result.append(sum(terms, domain.zero) / (begin * k))
         return Laurent(self.field, 0, result)
 
     def __abs__(self) -> Laurent:
@@ -183,6 +209,15 @@ def coefficients(stepper: Stepper) -> tuple[Any, Mapping[str, Any]]:
     return domain, {
         formula: domain.from_sympy(value.expand()) for formula, value in expressions.items()
     }
+
+
+def in_reals(domain: Any, elements: Mapping[str, Any]) -> tuple[Any, Mapping[str, Any]]:
+    """Return the real numbers, and the `coefficients` of a scheme among them."""
+    from sympy import RealField
+
+    reals = RealField(_BITS)
+    exact = {formula: domain.to_sympy(element) for formula, element in elements.items()}
+    return reals, {formula: reals.from_sympy(value.evalf(40)) for formula, value in exact.items()}
 
 
 def _solved(

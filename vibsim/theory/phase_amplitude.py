@@ -25,10 +25,11 @@ Source: vibration text (B), sections 4.1-4.4, 5.6 and 7.1 with `errata`; exercis
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
+from contextlib import suppress
 from dataclasses import dataclass
 from fractions import Fraction
-from functools import lru_cache
+from functools import cached_property, lru_cache
 from itertools import pairwise
 from typing import Any
 
@@ -38,9 +39,16 @@ from numpy.typing import ArrayLike, NDArray
 from vibsim.core.array_types import Floats
 from vibsim.schemes.base import Stepper
 from vibsim.theory.arithmetic import bairstow, by_quadratic, characteristic
-from vibsim.theory.basis import unit_steps
-from vibsim.theory.degrees import ROUNDED
-from vibsim.theory.laurent import HALF, SUBSTITUTES, Field, Laurent, coefficients
+from vibsim.theory.basis import NoSeriesError, require_formula, unit_steps
+from vibsim.theory.laurent import (
+    HALF,
+    ROUNDED,
+    SUBSTITUTES,
+    Field,
+    Laurent,
+    coefficients,
+    in_reals,
+)
 
 CRITICAL = 2.0
 """Critical damping rate over w: from here on nothing oscillates."""
@@ -66,7 +74,7 @@ class Principal:
     trace: Laurent
     determinant: Laurent
 
-    @property
+    @cached_property
     def square(self) -> Laurent:
         """The square of ``w~ h``."""
         return (self.trace * HALF * self.determinant**-HALF).square_of_angle()
@@ -75,12 +83,30 @@ class Principal:
 def principal(stepper: Stepper, damping: float, known: int) -> Principal:
     """Return a step on ``u'' + g u' + u = 0`` in series that are truncated at the power `known` of h.
 
-    The factor is ``(x - 1)^2`` at h = 0, where the quotient has no root 1 if the scheme converges. So it exists and is
-    unique (Hensel's lemma), and Bairstow's method doubles the number of correct powers.
+    They are exact, or real numbers where only the rounding of the scheme's coefficients lies between ``w~`` and ``w_d``
+    at h = 0. Raises `NoSeriesError` if more lies between them, or if the step compares numbers.
     """
-    domain, elements = coefficients(stepper)
-    field = Field(domain, known)
-    zero, h = field.constant(0.0), field.series(domain.one, 1)
+    require_formula(stepper)
+    exact = coefficients(stepper)
+    half = Fraction(repr(damping)) / 2
+    for domain, elements in (exact, in_reals(*exact)):
+        with suppress(ValueError):
+            step = _principal(stepper, damping, Field(domain, known), elements)
+            if (step.square.shifted(-2) - (1 - half * half)).vanishes:
+                return step
+    raise NoSeriesError("the numerical frequency does not tend to w as dt tends to 0")
+
+
+def _principal(
+    stepper: Stepper, damping: float, field: Field, elements: Mapping[str, Any]
+) -> Principal:
+    """Return a step in series with coefficients in a field; `elements` has those of the scheme.
+
+    The quadratic factor is ``(x - 1)^2`` at h = 0, where the quotient has no root 1 if the scheme converges. So it
+    exists and is unique (Hensel's lemma), and Bairstow's method doubles the number of correct powers. Raises ValueError
+    if there is none, as with rounded coefficients in exact numbers.
+    """
+    zero, h = field.constant(0.0), field.series(field.domain.one, 1)
     units = unit_steps(
         stepper,
         h,
@@ -94,10 +120,13 @@ def principal(stepper: Stepper, damping: float, known: int) -> Principal:
     while len(polynomial) > 3 and polynomial[-1].leading is None:
         polynomial.pop()
     trace, determinant = field.constant(2.0), field.constant(1.0)
-    up = down = trace
-    while up.leading is not None or down.leading is not None:
+    for _ in range(field.known.bit_length() + 2):
         up, down = bairstow(polynomial, trace, determinant)
+        if not up.vanishes or not down.vanishes:
+            break
         trace, determinant = trace + up, determinant - down
+    if up.leading is not None or down.leading is not None:
+        raise ValueError("the characteristic polynomial has no factor (x - 1)^2 at dt = 0")
     # a velocity of 1 is h in a step
     starts = [[(zero + x).shifted(k) for x in state] for k, state in enumerate(units.start)]
     return Principal(matrix, np.array(starts, dtype=object), polynomial, trace, determinant)

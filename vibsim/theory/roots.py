@@ -286,7 +286,7 @@ def _limit(stepper: Stepper) -> float:
     limit = _first(partial(_grows, stepper), grid[growing[0] - 1], grid[growing[0]])
     low, high = limit * (1.0 - _BESIDE), limit * (1.0 + _BESIDE)
     below, above = _largest(stepper, np.array([low, high]))
-    if above <= _CROSSED and np.all(_largest(stepper, limit * _BELOW) > 0.0):
+    if _UNSEEN < above <= _CROSSED and np.all(_largest(stepper, limit * _BELOW) > 0.0):
         return 0.0
     if not (below < -_CROSSED and above > _CROSSED):
         return limit

@@ -16,9 +16,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vibsim.schemes.base import Stepper
-from vibsim.schemes.newton import solved, solved_together
 from vibsim.theory.arithmetic import characteristic
-from vibsim.theory.basis import unit_steps
+from vibsim.theory.basis import LINEAR, require_formula, unit_steps
 from vibsim.theory.laurent import HALF, Laurent, coefficients
 from vibsim.theory.phase_amplitude import Principal, principal, principal_mode
 
@@ -144,9 +143,13 @@ def solution(stepper: Stepper) -> Any:
 
 @lru_cache(maxsize=64)
 def matrices(stepper: Stepper) -> tuple[NDArray[Any], NDArray[Any], NDArray[Any]]:
-    """Return step, start and velocity of `vibsim.theory.Amplification` in a field of fractions of SymPy."""
+    """Return step, start and velocity of `vibsim.theory.Amplification` in a field of fractions of SymPy.
+
+    Raises `NoSeriesError` if the step compares numbers.
+    """
     from sympy import field
 
+    require_formula(stepper)
     domain, elements = coefficients(stepper)
     fractions, p = field("p", domain)
     units = unit_steps(
@@ -154,32 +157,13 @@ def matrices(stepper: Stepper) -> tuple[NDArray[Any], NDArray[Any], NDArray[Any]
         p,
         fractions.zero,
         lambda formula: fractions.ground_new(elements[formula]),
-        substitutes={solved: _solved, solved_together: _solved_together},
+        substitutes=LINEAR,
     )
     step, first, velocity = (
         (np.array(columns, dtype=object) * fractions.one).T
         for columns in (units.step, units.start, units.velocity)
     )
     return step, first, velocity
-
-
-def _solved(
-    x: Any, u: Any, d_u: Any, v: Any, d_v: Any, t: Any, p: Any, acceleration: Any, slopes: Any
-) -> Any:
-    """Solve the equation of `vibsim.schemes.newton.solved` for a linear force."""
-    by_u, by_v = slopes(u, v, t, p)
-    return acceleration(u, v, t, p) / (1.0 - (d_u * by_u + d_v * by_v))
-
-
-def _solved_together(
-    x: Any, y: Any, u: Any, d_u: Any, v: Any, d_v: Any, t: Any, p: Any, acceleration: Any, slopes: Any
-) -> Any:  # fmt: skip
-    """Solve the equations of `vibsim.schemes.newton.solved_together` for a linear force."""
-    one, two = (acceleration(u[i], v[i], t[i], p) for i in range(2))
-    by_u, by_v = slopes(u[0], v[0], t[0], p)
-    a, b, c, d = (by_u * i + by_v * j for i, j in zip(d_u, d_v, strict=True))
-    bottom = (1.0 - a) * (1.0 - d) - b * c
-    return (one * (1.0 - d) + b * two) / bottom, (two * (1.0 - a) + c * one) / bottom
 
 
 def expression(element: Any) -> Any:

@@ -44,18 +44,22 @@ def theory(options: Namespace) -> int:
 
 def theory_rows(scheme: Scheme, options: Options, terms: int) -> Iterator[Row]:
     """Yield the theory of a scheme with constant steps; each series has `terms` terms."""
-    from vibsim.theory import operators, symbolic
+    from vibsim.theory import NoSeriesError, operators, symbolic
 
     stepper = scheme.stepper(options)
     changed = (f"{k} = {v}" for k, v in options.items() if v != scheme.defaults()[k])
     yield "scheme", "; ".join((f"{scheme.kind}: {scheme.title}", *changed))
     yield "problem", "u'' + w^2 u = 0, u(0) = I, u'(0) = V; p = w dt"
     yield "stability limit", stable_until(scheme, options)
-    yield "roots", f"{_characteristic(operators.recurrence(stepper))} = 0"
+    try:
+        polynomial = operators.recurrence(stepper)
+    except NoSeriesError as reason:
+        yield "formulas", f"not written: {reason}"
+        return
+    yield "roots", f"{_characteristic(polynomial)} = 0"
     try:
         yield from [*_series_rows(scheme, options, terms)]
-    except ValueError:
-        reason = "the numerical frequency does not tend to w as dt tends to 0"
+    except NoSeriesError as reason:
         yield "series", f"not written: {reason}, so the scheme is not one for this equation"
     yield from _in_operators(stepper)
     try:
@@ -188,14 +192,14 @@ def _equation(equation: Equation) -> str:
 
 
 def _short(formula: Any) -> Any:
-    """Return a formula with roots, and fractions of large numbers, as decimals."""
+    """Return a formula with roots, long decimals, and fractions of large numbers, as short decimals."""
     from sympy import Float, Integer, Pow, Rational, fraction, together
 
     from vibsim.theory.symbolic import symbol
 
     is_long = any(max(abs(x.p), x.q) > _LONGEST for x in formula.atoms(Rational))
     has_roots = any(x.is_number and not x.is_Rational for x in formula.atoms(Pow))
-    if not is_long and not has_roots:
+    if not is_long and not has_roots and not formula.atoms(Float):
         return formula
     numerator, denominator = (x.expand().evalf(_PRECISE) for x in fraction(together(formula)))
     scale = denominator.subs(symbol("p"), 0)
