@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from types import MappingProxyType
 
 from vibsim.core.registry import Registry
+from vibsim.schemes.acceptance import fault_of
 from vibsim.schemes.adaptive import ADAPTIVE
 from vibsim.schemes.base import (
     AnyOption,
@@ -15,7 +16,6 @@ from vibsim.schemes.base import (
     Options,
     Scheme,
     Stepper,
-    fault_of,
 )
 from vibsim.schemes.central import CENTRED
 from vibsim.schemes.composition import COMPOSITIONS
