@@ -9,10 +9,10 @@ import numpy as np
 import pytest
 
 from vibsim.elementary import primitives
-from vibsim.engine.coordinates import vector
 from vibsim.native.linking import identity, link
 from vibsim.native.machine import machine_code
 from vibsim.native.source import NativeError
+from vibsim.schemes.step_numbers import vector
 
 PLAIN = {"compiled": lambda f: f, "called": lambda f: f, "entry": lambda f: f}
 PLAIN |= {name: getattr(primitives, name) for name in primitives.NAMES} | {

@@ -6,7 +6,7 @@ import pytest
 
 from vibsim import Experiment, analyse, simulate, theory, verdicts
 from vibsim.cli.commands.theory import theory_rows
-from vibsim.core.errors import VibsimError
+from vibsim.core.errors import SimulationError, VibsimError
 from vibsim.schemes import FIXED_STEP, Scheme, Stepper
 from vibsim.schemes.code_generation import self_starting
 from vibsim.schemes.orders import same_orders
@@ -209,3 +209,23 @@ def test_finer_levels_are_not_advised_where_they_grow_more(levels):
 
 def test_every_scheme_of_vibsim_is_zero_stable():
     assert all(theory.is_zero_stable(s.stepper(s.defaults())) for s in FIXED_STEP.values())
+
+
+def step_by_direction(state, t, dt, p, acceleration):
+    """Compare the velocity with 0, which vectors do not allow."""
+    u, v = state
+    ahead = v + dt * acceleration(u, v, t, p) if v > 0.0 else v
+    return (u + dt * ahead, ahead), v
+
+
+@pytest.mark.parametrize("level", [4, 17], ids=["plain", "compiled"])
+def test_a_step_that_has_no_meaning_for_vectors_is_refused_with_the_name_of_its_scheme(level):
+    experiment = Experiment(
+        model={"kind": "system", "coordinates": ["x", "y"], "acceleration": {"x": "-x", "y": "-y"}},
+        initial={"x": 1.0},
+        schemes=[own(step_by_direction)],
+        time={"end": 1.0},
+        levels=[level],
+    )
+    with pytest.raises(SimulationError, match="scheme step_by_direction: "):
+        simulate(experiment, level)

@@ -3,66 +3,16 @@
 For a model with several coordinates positions, velocities and accelerations are vectors. Sums of vectors and products
 with numbers are computed component by component, so that uncoupled coordinates have the same bits as each alone;
 ``abs`` is the Euclidean norm. Anything else (a product of two vectors, a comparison, a number added to a vector) is
-refused. In compiled code a vector is a tuple of floats (`vibsim.native`), in plain Python a `Vector`.
+refused. In compiled code a vector is a tuple of floats (`vibsim.native`), in plain Python a `Vector` of
+`vibsim.schemes.step_numbers`.
 """
 
 from __future__ import annotations
 
-import math
-from functools import reduce
-from operator import add, neg, sub
-from typing import Any, NoReturn
-
-from vibsim.core.errors import SimulationError
 from vibsim.engine import gather
-from vibsim.engine.text import Module, collect, divided
+from vibsim.engine.text import Module, collect
 from vibsim.schemes import newton
 from vibsim.schemes.base import Stepper, no_backward
-
-
-class Vector(tuple[float, ...]):
-    """A vector in the plain lane."""
-
-    __slots__ = ()
-
-    def __add__(self, other: Any) -> Vector:
-        return Vector(map(add, self, self._vector(other)))
-
-    def __sub__(self, other: Any) -> Vector:
-        return Vector(map(sub, self, self._vector(other)))
-
-    def __mul__(self, number: Any) -> Vector:
-        return Vector([a * self._number(number) for a in self])
-
-    __rmul__ = __mul__
-
-    def __truediv__(self, number: Any) -> Vector:
-        return Vector([divided(a, self._number(number)) for a in self])
-
-    def __repr__(self) -> str:
-        return f"vector{tuple(self)}"
-
-    def __neg__(self) -> Vector:
-        return Vector(map(neg, self))
-
-    def __abs__(self) -> float:
-        return math.sqrt(reduce(add, [a * a for a in self]))
-
-    def _vector(self, other: Any) -> Vector:
-        return other if isinstance(other, Vector) else self._refuse()
-
-    def _number(self, other: Any) -> float:
-        return self._refuse() if isinstance(other, Vector) else other
-
-    def _refuse(self, *_: Any) -> NoReturn:
-        raise SimulationError("an operation of the scheme has no meaning for vectors")
-
-    __lt__ = __le__ = __gt__ = __ge__ = __radd__ = __rsub__ = __rtruediv__ = _refuse
-
-
-def vector(*components: float) -> Vector:
-    """Return a vector; kernels call this name."""
-    return Vector(components)
 
 
 def put_vectors(module: Module, stepper: Stepper, count: int) -> None:

@@ -37,11 +37,12 @@ from vibsim.engine.formulas import (
     put_parameters,
 )
 from vibsim.engine.stages import stages
-from vibsim.engine.text import Module, collect, divided, plain_code
+from vibsim.engine.text import Module, collect, plain_code
 from vibsim.models import Model, has_budget
 from vibsim.models.base import Formula
 from vibsim.native.kernel_cache import Kernel, load
 from vibsim.schemes.base import HANDED, Stepper, handed
+from vibsim.schemes.step_numbers import divided, vector
 
 LANES = ("plain", "scalar", "blocks")
 
@@ -201,7 +202,7 @@ def _settings(
         **events.columns(count),
     }
     if count > 1:
-        settings["ZERO"] = coordinates.vector(*[0.0] * count)
+        settings["ZERO"] = vector(*[0.0] * count)
     return settings
 
 
@@ -255,7 +256,7 @@ def _module(lane: str, settings: Mapping[str, object]) -> Module:
 
 def _in_lane(module: Module, lane: str, kinds: str) -> Kernel:
     if lane == "plain":
-        namespace: dict[str, Any] = {"divided": divided, "math": math, "vector": coordinates.vector}
+        namespace: dict[str, Any] = {"divided": divided, "math": math, "vector": vector}
         for part in (_PLAIN, *module.parts.values()):
             exec(plain_code(part), namespace)
         plain: Kernel = namespace[module.entry]

@@ -18,7 +18,7 @@ from typing import Any
 
 from vibsim.core.errors import SimulationError
 from vibsim.schemes.base import HANDED
-from vibsim.schemes.step_numbers import POWER_RULE, small_power
+from vibsim.schemes.step_numbers import POWER_RULE, divided, small_power
 
 
 @dataclass
@@ -262,17 +262,6 @@ class _Powers(ast.NodeTransformer):
         for _ in range(exponent - 1):
             result = ast.BinOp(left=result, op=ast.Mult(), right=copy.deepcopy(node.left))
         return result
-
-
-def divided(a: Any, b: Any) -> Any:
-    """Return a/b by IEEE 754, also for b = 0, where Python raises; a may be a vector."""
-    if b != 0.0 or isinstance(a, tuple):
-        return a / b
-    return (
-        math.nan
-        if a == 0.0 or math.isnan(a)
-        else math.copysign(math.inf, a) * math.copysign(1.0, b)
-    )
 
 
 class _Quotients(ast.NodeTransformer):

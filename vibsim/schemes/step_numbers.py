@@ -11,11 +11,13 @@ import math
 from collections.abc import Callable
 from contextvars import ContextVar
 from dataclasses import dataclass
-from typing import Any
+from functools import reduce
+from operator import add, neg, sub
+from typing import Any, NoReturn
 
 import numpy as np
 
-from vibsim.core.errors import VibsimError
+from vibsim.core.errors import SimulationError, VibsimError
 
 HIGHEST_POWER = 8
 """Highest exponent of a power in a step, which is multiplied out."""
@@ -151,11 +153,63 @@ class Plain(Arithmetic):
         return Plain(self.nearest * self.lift(other).nearest)
 
     def __truediv__(self, other: Any) -> Plain:
-        divisor = self.lift(other).nearest
-        if divisor != 0.0:
-            return Plain(self.nearest / divisor)
-        size = math.nan if self.nearest == 0.0 else math.copysign(math.inf, self.nearest)
-        return Plain(size * math.copysign(1.0, divisor))
+        return Plain(divided(self.nearest, self.lift(other).nearest))
 
     def __abs__(self) -> Plain:
         return self if self >= 0.0 else -self
+
+
+def divided(a: Any, b: Any) -> Any:
+    """Return a/b by IEEE 754, also for b = 0, where Python raises; a may be a vector."""
+    if b != 0.0 or isinstance(a, tuple):
+        return a / b
+    size = math.nan if a == 0.0 or math.isnan(a) else math.copysign(math.inf, a)
+    return size * math.copysign(1.0, b)
+
+
+class Vector(tuple[float, ...]):
+    """Position, velocity or acceleration of a model with several coordinates."""
+
+    __slots__ = ()
+
+    def __add__(self, other: Any) -> Vector:
+        return Vector(map(add, self, self._vector(other)))
+
+    def __sub__(self, other: Any) -> Vector:
+        return Vector(map(sub, self, self._vector(other)))
+
+    def __mul__(self, number: Any) -> Vector:
+        return Vector([a * self._number(number) for a in self])
+
+    __rmul__ = __mul__
+
+    def __truediv__(self, number: Any) -> Vector:
+        return Vector([divided(a, self._number(number)) for a in self])
+
+    def __repr__(self) -> str:
+        return f"vector{tuple(self)}"
+
+    def __neg__(self) -> Vector:
+        return Vector(map(neg, self))
+
+    def __abs__(self) -> float:
+        return math.sqrt(reduce(add, [a * a for a in self]))
+
+    def _vector(self, other: Any) -> Vector:
+        return other if isinstance(other, Vector) else self._refuse()
+
+    def _number(self, other: Any) -> Any:
+        return self._refuse() if isinstance(other, Vector) else other
+
+    def _refuse(self, *_: Any) -> NoReturn:
+        raise SimulationError(
+            "the step multiplies or compares two vectors, or adds a number to one. With several coordinates compare "
+            "numbers, such as abs(v), and write ZERO for 0"
+        )
+
+    __lt__ = __le__ = __gt__ = __ge__ = __radd__ = __rsub__ = __rtruediv__ = _refuse
+
+
+def vector(*components: float) -> Vector:
+    """Return a vector; kernels call this name."""
+    return Vector(components)

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from vibsim.core.array_types import Integers
+from vibsim.core.errors import SimulationError
 from vibsim.engine import Trajectories, integrate
 from vibsim.experiment import sweep_columns
 from vibsim.models import Model
@@ -52,17 +53,13 @@ def solve(
                 continue
             is_tabulated = method.adaptive or model.loaded is not None
             for where in adaptive.pieces(members, steps) if is_tabulated else (members,):
-                run = integrator(model, method)(
-                    model,
-                    method,
-                    options,
-                    parameters[where],
-                    initial[where],
-                    group.end[where] / steps,
-                    steps,
-                    every,
-                    **more,
-                )
+                numbers = parameters[where], initial[where], group.end[where] / steps
+                try:
+                    run = integrator(model, method)(
+                        model, method, options, *numbers, steps, every, **more
+                    )
+                except SimulationError as error:
+                    raise SimulationError(f"scheme {scheme.name}: {error}") from error
                 runs.append((run, where))
                 if link < experiment.chain - 1:
                     initial[where + 1] = run.states[:, :, -1].T
