@@ -484,6 +484,8 @@ def test_a_number_that_is_right_has_the_words_of_its_kind():
     assert of_levels not in reasons.reason("match", "value", value="stability_limit").needs
     assert of_levels not in reasons.reason("match", "value", value="accepted_steps").needs
     assert of_levels in reasons.reason("match", "value", value="period", levels=3).needs
+    for kind in ("stable", "conserves"):
+        assert "order" not in " ".join(reasons.reason("pre_asymptotic", kind))
     alone = reasons.reason("match", "value", value="period", levels=1)
     assert alone.needs.startswith("More levels")
 

@@ -102,32 +102,46 @@ _NUMBERS = {
 }
 """Needs of a number that is as expected: from several levels, from one, from the scheme alone, or a count."""
 _BY_KIND = {
-    "stable": Reason(
+    ("stable", "match"): Reason(
         "The growth of the amplitude is as the check expects.",
         "A growth factor that agrees with the predicted one. If the scheme has a limit, w dt should be well within or "
         "well beyond it; if not, a finer level should show whether the growth becomes smaller.",
     ),
-    "conserves": Reason(
+    ("conserves", "match"): Reason(
         "The error of the energy changes with time as the check expects.",
         "A run of many periods, because an oscillation hides a slow drift at first. The figure of the running "
         "maximum shows it at every time.",
     ),
-    "accurate": Reason(
+    ("accurate", "match"): Reason(
         "The error of the finest level is as the check expects.",
         "An error that is known: the true one, or an estimate on levels that show their order. The bound is a tested "
         "estimate, not a proof.",
     ),
-    "equal": Reason(
+    ("equal", "match"): Reason(
         "The two solutions are as close as the check expects.",
         "A distance well below the allowed one at every stored time. Without `atol`, the rounding errors of both are "
         "allowed.",
     ),
+    ("stable", "pre_asymptotic"): Reason(
+        "The levels do not follow one motion. Their largest speeds differ, as where a force becomes infinite.",
+        "An interval that ends before the force becomes infinite, or finer levels if the step is too coarse.",
+    ),
+    ("conserves", "pre_asymptotic"): Reason(
+        "The run does not show how the error of the energy grows. It is too short, or too little of it is stored.",
+        "A run of at least four periods of the slowest small oscillation, with more stored samples (`samples: all`).",
+    ),
+    (BY_TOLERANCE, "match"): Reason(
+        "The error bound of the extrapolated solution is within the tolerance, for every scheme and member at every "
+        "stored time.",
+        "The bound is a tested estimate, not a proof. best.nc has it for every time (output: best).",
+    ),
+    (BY_TOLERANCE, "mismatch"): Reason(
+        "The levels were chosen by a pilot of a few members. Another member is harder, and its error is not known to "
+        "be within the tolerance.",
+        "Finer levels, or a pilot that tries such members. The worst are listed below.",
+    ),
 }
-
-_POLE = Reason(
-    "The levels do not follow one motion. Their largest speeds differ, as where a force becomes infinite.",
-    "An interval that ends before the force becomes infinite, or finer levels if the step is too coarse.",
-)
+"""Explanation of a reason for one kind of check, where it differs from that for others."""
 
 _OF_PROMISE = {
     "order_low": Reason(
@@ -145,19 +159,6 @@ _OF_PROMISE = {
 REFUTED = "The measurement contradicts the statement, as expected."
 """Meaning of a match for a claim that is expected to be false."""
 
-_OF_TOLERANCE = {
-    "match": Reason(
-        "The error bound of the extrapolated solution is within the tolerance, for every scheme and member at every "
-        "stored time.",
-        "The bound is a tested estimate, not a proof. best.nc has it for every time (output: best).",
-    ),
-    "mismatch": Reason(
-        "The levels were chosen by a pilot of a few members. Another member is harder, and its error is not known to "
-        "be within the tolerance.",
-        "Finer levels, or a pilot that tries such members. The worst are listed below.",
-    ),
-}
-
 
 def reason(
     word: str | None, kind: str, value: str = "", levels: int = 2, is_promised: bool = False
@@ -167,14 +168,11 @@ def reason(
     `value` is the number of a ``value`` check, measured on `levels` levels; `is_promised` says whether an order that
     misses the one of the check is the one that the scheme promises.
     """
+    word = word or ""
     if is_promised and word in _OF_PROMISE:
         return _OF_PROMISE[word]
-    if kind == BY_TOLERANCE and word in _OF_TOLERANCE:
-        return _OF_TOLERANCE[word]
-    if word == "pre_asymptotic" and kind == "stable":
-        return _POLE
-    if word == "match" and kind in _BY_KIND:
-        return _BY_KIND[kind]
+    if (kind, word) in _BY_KIND:
+        return _BY_KIND[kind, word]
     if word == "match" and kind != "converges":
         origin = "several" if levels > 1 else "one"
         if value and not VALUES[value].depends_on_level:
@@ -182,4 +180,4 @@ def reason(
         if value and VALUES[value].is_count_of_work:
             origin = "counted"
         return Reason("The measured number is as expected.", _NUMBERS[origin])
-    return REASONS.get(word or "", Reason("", ""))
+    return REASONS.get(word, Reason("", ""))
