@@ -24,7 +24,7 @@ from vibsim.core import registry
 from vibsim.core.errors import InputError
 from vibsim.engine import integrate
 from vibsim.models import MODELS
-from vibsim.models.base import fault_of
+from vibsim.models.acceptance import fault_of
 from vibsim.plan import Choice, build, code_digest, load
 from vibsim.schemes import SCHEMES
 

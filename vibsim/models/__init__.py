@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from vibsim.core.registry import Registry
+from vibsim.models.acceptance import fault_of
 from vibsim.models.base import (
     BUDGET,
     ENERGIES,
@@ -13,7 +14,6 @@ from vibsim.models.base import (
     Parameter,
     State,
     centred,
-    fault_of,
     has_budget,
     has_solution,
     natural_end,
