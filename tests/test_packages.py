@@ -311,6 +311,47 @@ def test_an_exact_motion_may_be_known_for_some_initial_values_alone() -> None:
     assert fault_of(replace(MODELS["spring"], kind="mine", exact=from_rest)) == ""
 
 
+DAMPED = {"acceleration": "-w**2*u - 0.1*v", "conservative": False}
+
+
+@pytest.mark.parametrize(
+    ("changes", "rule"),
+    [
+        ({"acceleration": "-w**2*u**3", "conservative": False}, "not linear in u"),
+        ({"acceleration": "-w**2*u*sign(u - 2)", "conservative": False}, "not linear in u"),
+        ({"acceleration": "-w**2*u*1.001"}, "kinetic_energy + potential_energy changes"),
+        ({**DAMPED, "dissipation": "0.11*v**2"}, "driving less dissipation"),
+        ({**DAMPED, "dissipation": "0.1*v**2"}, ""),
+        (DAMPED, ""),
+        # no formula can be worked out for states near 1
+        ({"linear": False, "acceleration": "-sqrt(u - 5)", "potential_energy": "sqrt(u - 5)"}, ""),
+    ],
+)
+def test_a_model_that_contradicts_itself_is_refused(changes: dict[str, Any], rule: str) -> None:
+    fault = fault_of(replace(MODELS["spring"], kind="mine", exact=None, **changes))
+    assert rule in fault
+    assert bool(fault) == bool(rule)
+
+
+def test_a_linear_model_of_two_coordinates_is_refused() -> None:
+    spring = MODELS["spring"]
+    names = ("x", "y", "v", "w_y")
+    states = tuple(replace(spring.states[0], name=name) for name in names)
+    plane = replace(
+        spring,
+        kind="mine",
+        states=states,
+        acceleration="-w**2*x",
+        further_accelerations=("-w**2*y",),
+        kinetic_energy="(v**2 + w_y**2)/2",
+        potential_energy="w**2*(x**2 + y**2)/2",
+        exact=None,
+        exact_period=None,
+    )
+    assert "write linear=False" in fault_of(plane)
+    assert fault_of(replace(plane, linear=False)) == ""
+
+
 def test_two_packages_with_one_name_are_both_named(
     offered: Place, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -7,7 +7,7 @@ and calls of `FUNCTIONS`. Text of a user is never compiled or evaluated as Pytho
 
 from vibsim.formula.algebra import is_multiple, is_zero, tidied
 from vibsim.formula.arrays import bounds, values, values_of
-from vibsim.formula.derivatives import derivative
+from vibsim.formula.derivatives import derivative, is_linear
 from vibsim.formula.integrals import has_rule, integral
 from vibsim.formula.jumps import Pulses, Switch, first_jump, held, hidden_pulses
 from vibsim.formula.parser import MAX_CHARACTERS, MAX_DEPTH, ExpressionError, parse
@@ -36,6 +36,6 @@ __all__ = [
     "CONSTANTS", "FUNCTIONS", "MAX_CHARACTERS", "MAX_DEPTH", "ONE", "ZERO", "Binary", "Call",
     "Compare", "Expression", "ExpressionError", "Name", "Negate", "Number", "Pulses", "Switch",
     "bounds", "constant", "derivative", "evaluate", "first_jump", "has_rule", "held", "hidden_pulses", "integral",
-    "is_multiple", "is_zero", "literal", "parse", "parts_of",
+    "is_linear", "is_multiple", "is_zero", "literal", "parse", "parts_of",
     "put", "rebuilding", "replacing", "tidied", "to_formula", "to_statements", "values", "values_of", "walk",
 ]  # fmt: skip

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 
-from vibsim.formula.algebra import filled
+from vibsim.formula.algebra import filled, is_jump
 from vibsim.formula.tree import (
     ONE,
     STEPS,
@@ -18,6 +18,7 @@ from vibsim.formula.tree import (
     literal,
     number,
     parts_of,
+    walk,
 )
 
 _BELL = f"{2.0 / math.sqrt(math.pi)!r}*exp(-x**2)"
@@ -51,6 +52,12 @@ _RULES = {
     "abs": "sign(x)",
 }
 """Derivatives of functions of one argument x with value f."""
+
+
+def is_linear(node: Expression, name: str, variables: Iterable[str]) -> bool:
+    """Tell whether a formula is linear in a name, with a coefficient that contains none of the variables."""
+    jumps = any(is_jump(part) and name in part.names for part in walk(node))
+    return not jumps and derivative(node, name).names.isdisjoint(variables)
 
 
 def derivative(node: Expression, name: str) -> Expression:

@@ -8,17 +8,18 @@ import re
 import numpy as np
 
 from vibsim.core.vocabulary import VECTORS
-from vibsim.formula import CONSTANTS, FUNCTIONS, ExpressionError
+from vibsim.formula import CONSTANTS, FUNCTIONS, ExpressionError, Negate, is_linear
 from vibsim.models.base import (
     Model,
-    Numbers,
     Output,
     Parameter,
     State,
     parameter_names,
     quantities,
+    rate,
     tree,
 )
+from vibsim.models.shared.identities import NEAR_ONE, zeros
 
 _TAKEN = ("t", "scheme", "case", "level", "status", "end", *VECTORS)
 """Names that have another meaning in files or formulas."""
@@ -49,14 +50,16 @@ def fault_of(model: Model) -> str:
             tree(model, formula)
         except ExpressionError as error:
             return f"its formula of {name}, {error.text}: {error.rule}"
-    defaults = {parameter.name: parameter.default for parameter in model.parameters}
+    defaults = {parameter.key: parameter.default for parameter in model.parameters}
     try:
         np.asarray(model.natural_frequency(defaults), dtype=float)
     except Exception as error:
         return f"its natural_frequency gives no number at its defaults: {type(error).__name__}: {error}"
     # one that is written from a file is not complete yet
-    if model.written is None and (fault := _fault_of_exact(model, defaults)):
-        return fault
+    if model.written is None:
+        for fault_of_claim in (_fault_of_exact, _fault_of_force, _fault_of_energy):
+            if fault := fault_of_claim(model):
+                return fault
     # models that may take its place in an experiment
     made = {
         "named": model.named and model.named(model.positions),
@@ -69,8 +72,54 @@ def fault_of(model: Model) -> str:
     return ""
 
 
-def _fault_of_exact(model: Model, parameters: Numbers) -> str:
-    """Return why the exact motion or period of a model cannot be calculated at these parameters; empty if it can."""
+def _fault_of_force(model: Model) -> str:
+    """Return why a model cannot be linear, as it claims; empty if it can, or claims nothing."""
+    if not model.linear:
+        return ""
+    if not model.is_alone:
+        return "its linear says True, which is for one coordinate: write linear=False"
+    if is_linear(
+        tree(model, model.acceleration), model.position, (*model.positions, *model.velocities, "t")
+    ):
+        return ""
+    return (
+        f"its linear says True, but its acceleration is not linear in {model.position} with a constant coefficient: "
+        "write linear=False"
+    )
+
+
+def _fault_of_energy(model: Model) -> str:
+    """Return how the energies of a model contradict its acceleration; empty if not, or where formulas cannot tell.
+
+    Along a motion the energy changes by the power of driving forces less that of damping.
+    """
+    claims_powers = model.dissipation is not None or model.driving is not None
+    if not (model.conservative or claims_powers) or model.lookup or model.loaded:
+        return ""
+    energies = (rate(model, tree(model, x)) for x in (model.kinetic_energy, model.potential_energy))
+    lost, given = (tree(model, x or "0") for x in (model.dissipation, model.driving))
+    ends = {row.name: _range(row) for row in model.parameters}
+    states = [state.name for state in model.states]
+    if zeros([*energies, lost, Negate(given)], states, {"t": NEAR_ONE, **ends}).all():
+        return ""
+    if claims_powers:
+        return "its energies do not change by driving less dissipation along its motion: one of these formulas is wrong"
+    return (
+        "its conservative says True, but by its acceleration kinetic_energy + potential_energy changes: correct one "
+        "of them, or write conservative=False"
+    )
+
+
+def _range(parameter: Parameter) -> tuple[float, float]:
+    """Return bounds of numbers near the default of a parameter at which formulas are compared."""
+    ends = sorted(x * (parameter.default or 1.0) for x in NEAR_ONE)
+    least, most = np.clip(ends, parameter.minimum, parameter.maximum)
+    return float(least), float(most)
+
+
+def _fault_of_exact(model: Model) -> str:
+    """Return why the exact motion or period of a model cannot be calculated at its defaults; empty if it can."""
+    parameters = {parameter.key: parameter.default for parameter in model.parameters}
     initial = {state.name: 1.0 for state in model.states}
     try:
         if model.exact is not None:

@@ -17,7 +17,16 @@ from dataclasses import replace
 from functools import cache, partial, reduce
 from typing import Any
 
-from vibsim.formula import ZERO, Expression, Name, derivative, parse, replacing, to_formula
+from vibsim.formula import (
+    ZERO,
+    Expression,
+    Name,
+    derivative,
+    is_linear,
+    parse,
+    replacing,
+    to_formula,
+)
 from vibsim.formula.algebra import is_jump, terms_of
 from vibsim.formula.tree import walk
 from vibsim.models.base import Damping, FormulaField, Model, Output
@@ -106,7 +115,8 @@ def system(
         more |= {"exact": motion.exact, "start": motion.start}
     outputs = (key.partition(".") for key, _ in formulas)
     if len(coordinates) == 1:
-        more |= {"linear": _is_linear(own), "damping": _damping(own)}
+        linear = is_linear(own.accelerations[0], coordinates[0], (*own.states, "t", HEIGHT))
+        more |= {"linear": linear, "damping": _damping(own)}
     else:
         more |= {"linear": False, "highest_frequency": own.highest_frequency}
         more["superposed"] = is_conservative and _has_constant_slopes(own)
@@ -141,13 +151,6 @@ def system(
         named=named,
         **more,
     )
-
-
-def _is_linear(own: WrittenSystem) -> bool:
-    """Tell whether the acceleration of the only coordinate is linear in it, with a constant coefficient."""
-    (a,), (u,) = own.accelerations, own.coordinates
-    jumps = (part for part in walk(a) if is_jump(part) and u in part.names)
-    return not any(jumps) and own.is_constant(derivative(a, u))
 
 
 def _has_constant_slopes(own: WrittenSystem) -> bool:

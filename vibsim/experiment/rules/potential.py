@@ -11,7 +11,7 @@ from vibsim.experiment.faults import Report
 from vibsim.formula import ZERO, Expression, derivative, has_rule, parse, values, values_of
 from vibsim.models import Model, tree
 from vibsim.models.base import by_name
-from vibsim.models.shared.written_system import AGREE, TESTS
+from vibsim.models.shared.identities import AGREE, TESTS
 
 AMPLITUDES = (-6, 8)
 """Range of the exponents of 2 of the amplitudes at which both are compared."""

@@ -26,14 +26,11 @@ from vibsim.formula import (
     ZERO,
     Expression,
     Name,
-    Switch,
     derivative,
     has_rule,
-    held,
     integral,
     parse,
     put,
-    values,
     values_of,
 )
 from vibsim.formula.algebra import terms_of
@@ -42,20 +39,11 @@ from vibsim.models.base import Numbers, Parameter, by_name, declared_parameters,
 from vibsim.models.events import Crossings
 from vibsim.models.shared.coordinates import velocities_of
 from vibsim.models.shared.crossings import crossings
+from vibsim.models.shared.identities import NEAR_ONE, zeros
 from vibsim.models.shared.inertia import Inertia, inertia
 from vibsim.models.shared.manufactured import Manufactured
 from vibsim.models.table import HEIGHT, Lookup
 
-TESTS = 24
-"""Number of random points at which formulas are compared."""
-REACHES = (1.0, 10.0, 100.0, 1000.0, 10000.0)
-"""Sizes of states that are tried, from the least, to reach all sides of corners and jumps. [convention]"""
-TRIED = 2**12
-"""Number of states of each size that are tried."""
-MOST_SIDES = 2**8
-"""Largest number of combinations of sides that are tested."""
-AGREE = 1e-9
-"""Largest difference of equal formulas, relative to the size of their terms."""
 INPUT = "input"
 """Name of the table's current value in formulas."""
 
@@ -215,43 +203,9 @@ class WrittenSystem:
 
     def vanishes(self, terms: Any) -> bool:
         """Tell whether a sum is 0 at all test points where it is finite, and finite at one at least."""
-        formulas, switches = held(terms, (*self.states, "t", HEIGHT))
-        if not formulas:
-            return True
-        points = self._test_points(switches)
-        found = [np.broadcast_to(x, points["t"].shape) for x in values_of(formulas, points)]
-        total, size = np.sum(found, axis=0), np.sum(np.abs(found), axis=0)
-        known = np.isfinite(total)
-        return bool(known.any() and np.all(np.abs(total[known]) <= AGREE * size[known]))
-
-    def _test_points(self, switches: Sequence[Switch]) -> dict[str, Floats]:
-        """Return random states, parameters and modes of switches, with all combinations of modes that are found.
-
-        A mode that depends on the time is random, because a pulse may be too short to be found.
-        """
-        rng, others = np.random.default_rng(21), ("t", HEIGHT, *self.declared)
-        near = {name: rng.uniform(-1.0, 1.0, TESTS) for name in self.states}
-        near |= {name: rng.uniform(0.3, 1.7, TESTS) for name in others}
-        if not switches:
-            return near
-        size = np.repeat(REACHES, TRIED)
-        far = {name: size * rng.uniform(-1.0, 1.0, len(size)) for name in self.states}
-        far |= {name: rng.uniform(0.3, 1.7, len(size)) for name in others}
-        numbers = {name: np.concatenate([near[name], far[name]]) for name in near}
-        random, modes = {"t", HEIGHT}, []
-        for switch in switches:
-            if random.isdisjoint(switch.quantity.names):
-                q = np.broadcast_to(values(switch.quantity, numbers), TESTS + len(size))
-                mode = np.floor(q) if switch.whole else np.where(q > 0.0, 0.0, -1.0)
-            else:
-                random.add(switch.mode)
-                mode = rng.integers(-2 if switch.whole else -1, 1, TESTS + len(size)).astype(float)
-            numbers[switch.mode] = mode
-            modes.append(np.clip(mode, -2.0, 1.0))
-        # the first point with each combination of modes, beside the points that every formula has
-        _, first = np.unique(np.stack(modes), axis=1, return_index=True)
-        chosen = np.union1d(np.arange(TESTS), np.sort(first)[:MOST_SIDES])
-        return {name: number[chosen] for name, number in numbers.items()}
+        others = dict.fromkeys(("t", HEIGHT, *self.declared), NEAR_ONE)
+        are_zeros = zeros(terms, self.states, others)
+        return bool(are_zeros.any() and are_zeros.all())
 
     @cached_property
     def stiffness(self) -> dict[tuple[int, int], Expression]:
