@@ -48,7 +48,7 @@ def test_every_scheme_has_its_work_beside_its_error(records: dict[int, Any]) -> 
     record = analyse_records(EXPERIMENT, records)
     steps = np.array([2**level for level in EXPERIMENT.levels], dtype=float)
     for i in FIXED:
-        evaluations = SCHEMES[EXPERIMENT.schemes[i].kind].force_evaluations
+        evaluations = SCHEMES[EXPERIMENT.schemes[i].kind].evaluations
         assert np.array_equal(record["work_steps"][i], [steps, steps])
         assert np.array_equal(
             record["work_force_evaluations"][i], evaluations * record["work_steps"][i]

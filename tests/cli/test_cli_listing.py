@@ -41,7 +41,7 @@ def test_every_scheme_has_its_facts_in_columns(capsys: pytest.CaptureFixture[str
         )
         assert lines[k + 1].strip() == f"{scheme.title}; {scheme.source}"
         assert symplectic == ("yes" if scheme.symplectic else "no")
-        assert forces.split()[0] == str(scheme.force_evaluations)
+        assert forces.split()[0] == str(scheme.evaluations)
         if scheme.adaptive:
             assert (order, step, stable) == ("-", "adaptive", "chooses its own steps")
             continue

@@ -30,7 +30,7 @@ def taken(stage, function):
 @pytest.mark.parametrize("kind", EXPLICIT)
 def test_a_step_has_a_stage_for_each_of_several_forces(kind):
     scheme = EXPLICIT[kind]
-    number = scheme.force_evaluations
+    number = scheme.evaluations
     assert len(stages(step_of(scheme))) == (number if number > 1 else 0)
 
 

@@ -46,7 +46,6 @@ RALSTON = Scheme(
     family="Runge-Kutta",
     stepper=lambda options: from_tableau(Tableau((("2/3",),), ("1/4", "3/4"))),
     orders=lambda options: same_orders(2, energy_linear=3, energy_d2t_linear=3),
-    force_evaluations=2,
 )
 
 

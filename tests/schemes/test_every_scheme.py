@@ -215,7 +215,7 @@ def test_a_symmetric_scheme_runs_backwards_to_where_it_came_from(scheme, model):
 
 
 @pytest.mark.parametrize("scheme", FIXED)
-def test_the_force_is_evaluated_as_often_as_the_scheme_says(scheme):
+def test_the_force_is_evaluated_as_often_as_in_the_texts_and_within_the_step(scheme):
     """Per step, where nothing iterates."""
     if not scheme.explicit:
         return
@@ -230,7 +230,9 @@ def test_the_force_is_evaluated_as_often_as_the_scheme_says(scheme):
     assert min(asked) >= 0.0
     asked.clear()
     stepper.step(state, 0.1, 0.1, (), acceleration)
-    assert len(asked) == scheme.force_evaluations
+    # of a composition whose first and last substep are kicks, one less: the next step has it already
+    several = {"rk2": 2, "heun": 2, "rk3": 3, "rk4": 4, "yoshida4": 3, "pefrl": 4, "rkn4": 3}
+    assert scheme.evaluations == len(asked) == several.get(scheme.kind, 1)
     assert all(0.1 - 0.05 < t < 0.2 + 0.05 for t in asked)
 
 
@@ -249,7 +251,7 @@ def test_the_scheme_says_what_it_is(scheme):
     assert scheme.source
     assert scheme.family
     assert scheme.start
-    assert scheme.force_evaluations >= 1
+    assert scheme.evaluations >= 1
     assert scheme.defaults() == {option.name: option.default for option in scheme.options}
     assert all(option.description for option in scheme.options)
     for option in scheme.options:

@@ -339,7 +339,7 @@ def test_a_linear_force_takes_two_iterations(kind):
     state = handed(stepper.start, acceleration, slopes)(0, 1.0, 0.5, 0.1, ())
     calls.clear()
     handed(stepper.step, acceleration, slopes)(state, 0.1, 0.1, ())
-    assert len(calls) == 2 * scheme.force_evaluations
+    assert len(calls) == 2 * scheme.evaluations
 
 
 @pytest.mark.parametrize("kind", IMPLICIT)

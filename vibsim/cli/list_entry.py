@@ -97,7 +97,7 @@ def scheme_rows(scheme: Scheme) -> Iterator[Row]:
 
 def facts(scheme: Scheme) -> tuple[str, ...]:
     """Return order, kind of step, symplecticity, forces per step and stability limit, for default options."""
-    forces = str(scheme.force_evaluations)
+    forces = str(scheme.evaluations)
     symplectic = "yes" if scheme.symplectic else "no"
     if scheme.adaptive:
         return "-", "adaptive", symplectic, forces, "chooses its own steps"

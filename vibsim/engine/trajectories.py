@@ -88,7 +88,7 @@ def integrate(
     has_events, has_work = model.events is not None, has_budget(model)
     if lane is None:
         factor = work_alone(model)
-        step_work = sum(work(scheme.force_evaluations, scheme.explicit, factor))
+        step_work = sum(work(scheme.evaluations, scheme.explicit, factor))
         alone = stepper.implicit or factor is not None
         lane = lane_for(members, steps, alone=alone, step_work=step_work)
     run = kernel(model, stepper, lane, with_gathered, with_series, n_extrema > 0)

@@ -321,7 +321,7 @@ def level_cost(experiment: ExperimentSpec, level: int) -> LevelCost:
     kinds = [experiment.schemes[i].method for i in experiment.ladder]
     # the engine does not step a linear structure
     stepped = kinds if model.loaded is None else []
-    works = [work(kind.force_evaluations, kind.explicit, work_alone(model)) for kind in stepped]
+    works = [work(kind.evaluations, kind.explicit, work_alone(model)) for kind in stepped]
     # periods of an unswept member
     turns = experiment.time.end * float(model.natural_frequency(experiment.model.parameters))
     shared = sum(

@@ -163,7 +163,7 @@ def energy_error_d2t(block: MemberBlock, record: Record) -> Floats:
 
 def force_evaluations(block: MemberBlock, level: int) -> Floats:
     """Return the number of evaluations of the acceleration; for an implicit scheme, one per step and stage."""
-    counts = [scheme.method.force_evaluations for scheme in block.experiment.schemes]
+    counts = [scheme.method.evaluations for scheme in block.experiment.schemes]
     return _counted(block, level, "force_evaluations_total", np.array(counts, dtype=float))
 
 

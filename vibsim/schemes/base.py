@@ -11,7 +11,7 @@ import inspect
 import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
-from functools import partial
+from functools import cache, partial
 from typing import Any
 
 from vibsim.core.array_types import Floats
@@ -191,8 +191,9 @@ class Scheme:
     """The arithmetic for given options; equal options give the same function objects."""
     orders: Callable[[Options], Orders]
     """The formal orders for given options."""
-    force_evaluations: int = 1
-    """Evaluations of the acceleration per step; per iteration if the scheme is implicit."""
+    force_evaluations: int | None = None
+    """Evaluations of the acceleration per iteration of an implicit scheme, 1 if None; of an explicit one per step,
+    counted if None."""
     start: str = "none: a one-step method"
     """How the first step is made, in words."""
     explicit: bool = True
@@ -216,6 +217,13 @@ class Scheme:
     """Newmark parameters of the step on a linear structure; None if the scheme cannot step structures."""
     weighed: tuple[str, ...] = ()
     """Names of the options that apply to structures."""
+
+    @property
+    def evaluations(self) -> int:
+        """Evaluations of the acceleration per step; per iteration if the scheme is implicit."""
+        if self.force_evaluations is None:
+            return _evaluations(self.stepper(self.defaults())) if self.explicit else 1
+        return self.force_evaluations
 
     def defaults(self) -> dict[str, OptionValue]:
         """Return every option with its default."""
@@ -248,7 +256,7 @@ class Scheme:
     def unknowns(self, model: Model) -> int:
         """Return the number of unknowns of an implicit step on a model: the accelerations at all stages."""
         is_solved = not (self.explicit or self.adaptive) and model.coordinates > 1
-        return model.coordinates * self.force_evaluations if is_solved else 1
+        return model.coordinates * self.evaluations if is_solved else 1
 
     def stepper_for(self, model: Model, options: Options) -> Stepper:
         """Return the arithmetic for a model, with the special treatment of its damping if there is one.
@@ -313,3 +321,22 @@ class Scheme:
         """Tell whether the force is smooth in every step: steps end at the corners and do not look back across them."""
         is_multistep = self.family == "multistep"
         return model.lookup is None or (model.lookup.is_met and not is_multistep)
+
+
+@cache
+def _evaluations(stepper: Stepper) -> int:
+    """Return how often an explicit step evaluates the acceleration."""
+    places = []
+
+    def acceleration(u: float, v: float, t: float, p: Any) -> float:
+        places.append(u)
+        return -u
+
+    start, step = (
+        handed(f, acceleration, lambda u, v, t, p: (-1.0, 0.0))
+        for f in (stepper.start, stepper.step)
+    )
+    state = start(stepper.variant, 1.0, 0.5, 0.1, ())
+    places.clear()
+    step(state, 0.1, 0.1, ())
+    return len(places)

@@ -101,7 +101,6 @@ def _composed(
         step, carries = substep_function(substeps), carries_acceleration(substeps)
         return replace(self_starting(step, carries_acceleration=carries), own_velocity=own_velocity)
 
-    kicks = sum(name == KICK for name, _ in substeps)
     return Scheme(
         kind=kind,
         title=title,
@@ -110,7 +109,6 @@ def _composed(
         stepper=lambda options: stepper(),
         orders=lambda options: same_orders(order),
         even_powers=True,
-        force_evaluations=kicks - carries_acceleration(substeps),
         symplectic=True,
         symmetric=True,
         velocity_forces=False,

@@ -70,7 +70,6 @@ def _scheme(kind: str, title: str, source: str, tableau: Tableau, orders: Orders
         family="Runge-Kutta",
         stepper=lambda options: from_tableau(tableau),
         orders=lambda options: orders,
-        force_evaluations=len(tableau.b),
     )
 
 
@@ -162,7 +161,6 @@ RKN4 = Scheme(
     family="Runge-Kutta-Nystroem",
     stepper=lambda options: _nystrom(_CLASSICAL),
     orders=lambda options: same_orders(4),
-    force_evaluations=len(_CLASSICAL.velocity),
     velocity_forces=False,
 )
 

@@ -21,5 +21,4 @@ RALSTON = Scheme(
     family="Runge-Kutta",
     stepper=lambda options: from_tableau(TABLEAU),
     orders=lambda options: ORDERS,
-    force_evaluations=2,
 )

@@ -64,7 +64,7 @@ def _scheme(record: Results, s: int, quantities: list[str]) -> Iterator[Cell]:
     kinds += ["s"] if scheme.symplectic else []
     name = spec.name if spec.name.startswith(spec.kind) else f"{spec.name} ({spec.kind})"
     yield from (name, scheme.family, ", ".join(kinds))
-    yield None if scheme.adaptive else scheme.force_evaluations
+    yield None if scheme.adaptive else scheme.evaluations
     limit = _common(record.optional("stability_limit", MEMBER)[s])
     if isinstance(limit, float):
         limit = Written(limit, LIMITS.get(limit, words.number(limit, "step")))
