@@ -138,7 +138,11 @@ def test_with_registered_names_it_is_the_experiment_of_a_file() -> None:
 
 
 def test_two_experiments_may_have_different_models_of_one_name() -> None:
-    stronger = replace(RAYLEIGH, acceleration="2*mu*(1 - v**2)*v - u")
+    stronger = replace(
+        RAYLEIGH,
+        acceleration="2*mu*(1 - v**2)*v - u",
+        dissipation="-2*mu*(1 - v**2)*v**2",
+    )
     first, second = build(), build(model=stronger)
     before = simulate(first, 6).u.values
     assert simulate(second, 6).u.values[0, 0, -1] != before[0, 0, -1]
