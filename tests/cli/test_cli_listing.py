@@ -12,6 +12,7 @@ import pytest
 from vibsim import theory
 from vibsim.cli import main
 from vibsim.cli.commands import listing
+from vibsim.cli.list_entry import shape
 from vibsim.models import MODELS
 from vibsim.schemes import SCHEMES
 
@@ -129,3 +130,10 @@ def test_an_unknown_entry_comes_with_the_nearest(
     assert told in captured.err
     assert len(captured.err) < 400
     assert captured.out == ""
+
+
+def test_a_model_of_two_coordinates_is_not_called_nonlinear() -> None:
+    spring = MODELS["spring"]
+    assert [shape(MODELS[kind]) for kind in ("spring", "pendulum")] == ["linear", "nonlinear"]
+    plane = replace(spring, states=spring.states * 2, linear=False)
+    assert shape(plane) == "of 2 coordinates"

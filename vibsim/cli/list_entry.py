@@ -127,14 +127,21 @@ def choices(option: AnyOption) -> str:
     return f"{option.least:g} to {option.most:g} (default {option.default:g})"
 
 
+def shape(model: Model) -> str:
+    """Return in a word or two what kind of equation a model is."""
+    if model.coordinates > 1:
+        return f"of {model.coordinates} coordinates"
+    return "linear" if model.linear else "nonlinear"
+
+
 def model_rows(model: Model) -> Iterator[Row]:
     """Yield the properties of a model."""
     yield "model", f"{model.kind}: {model.title}"
     yield "equation", model.equation
     yield "source", model.source
     if model.written is None:
-        shape = "linear" if model.linear else "nonlinear"
-        yield "is", f"{shape}, {'conservative' if model.conservative else 'not conservative'}"
+        kept = "conservative" if model.conservative else "not conservative"
+        yield "is", f"{shape(model)}, {kept}"
     if model.named is not None:
         yield "coordinates", COORDINATES
     yield from _under("initial", map(_quantity, model.states))

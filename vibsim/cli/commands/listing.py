@@ -7,7 +7,7 @@ from collections.abc import Collection, Iterable
 from typing import TYPE_CHECKING
 
 from vibsim.cli.jobs.common import refusal
-from vibsim.cli.list_entry import choices, facts, in_full
+from vibsim.cli.list_entry import choices, facts, in_full, shape
 from vibsim.core.errors import Fault, InputError
 
 if TYPE_CHECKING:
@@ -59,13 +59,11 @@ def _models(models: Iterable[Model]) -> Iterable[tuple[str, str]]:
         parameters = ", ".join(
             f"{p.name} = {p.default:g}" + f" {p.unit}" * (p.unit != "1") for p in model.parameters
         )
-        shape = "linear" if model.linear else "nonlinear"
-        if model.written is not None:
-            # it depends on the experiment file
-            shape = ""
+        # a model that is written from a file depends on it
+        last = "" if model.written is not None else shape(model)
         if model.formulas:
-            shape = f"formulas {', '.join(row.name for row in model.formulas)}"
-        parts = (f"{model.title}: {model.equation}", parameters, shape)
+            last = f"formulas {', '.join(row.name for row in model.formulas)}"
+        parts = (f"{model.title}: {model.equation}", parameters, last)
         yield model.kind, "; ".join(filter(None, parts))
 
 
