@@ -40,8 +40,8 @@ NOTHING_MOVES = "Nothing moves here, so {} keeps its initial value with any sche
 MOVE = "Choose `initial:` values or a force that cause motion."
 """Advice if nothing moves."""
 WRONG_LIMIT_ADVICE = (
-    "Check `model:` and `initial:` against the intended equation, and the code of scheme {scheme} if it is your own. "
-    "Finer levels will not help."
+    "Check `model:` and `initial:` against the intended equation. If they are your own, check the code of scheme "
+    "{scheme} and the `exact` of the model. Finer levels will not help."
 )
 """Advice if levels approach another limit than the exact solution."""
 
