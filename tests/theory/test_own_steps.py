@@ -227,5 +227,5 @@ def test_a_step_that_has_no_meaning_for_vectors_is_refused_with_the_name_of_its_
         time={"end": 1.0},
         levels=[level],
     )
-    with pytest.raises(SimulationError, match="scheme step_by_direction: "):
+    with pytest.raises(SimulationError, match="scheme step_by_direction: its step fails: "):
         simulate(experiment, level)

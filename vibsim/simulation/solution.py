@@ -14,7 +14,7 @@ from vibsim.core.errors import SimulationError
 from vibsim.engine import Trajectories, integrate
 from vibsim.experiment import sweep_columns
 from vibsim.models import Model
-from vibsim.schemes import Scheme
+from vibsim.schemes import SCHEMES, Scheme
 from vibsim.simulation import adaptive, structure
 from vibsim.simulation.members import Members
 
@@ -58,8 +58,10 @@ def solve(
                     run = integrator(model, method)(
                         model, method, options, *numbers, steps, every, **more
                     )
-                except SimulationError as error:
-                    raise SimulationError(f"scheme {scheme.name}: {error}") from error
+                except (SimulationError, TypeError, ValueError) as error:
+                    if SCHEMES.built_in.get(method.kind) is method:
+                        raise
+                    raise SimulationError(f"scheme {scheme.name}: its step fails: {error}") from error
                 runs.append((run, where))
                 if link < experiment.chain - 1:
                     initial[where + 1] = run.states[:, :, -1].T
