@@ -54,9 +54,7 @@ def _no_orders(options: Options) -> Orders:
     return same_orders(math.nan, **dict.fromkeys(names, math.nan))
 
 
-def _scheme(
-    kind: str, title: str, source: str, family: str, force_evaluations: int, *, explicit: bool
-) -> Scheme:
+def _scheme(kind: str, title: str, source: str, family: str, force_evaluations: int) -> Scheme:
     return Scheme(
         kind=kind,
         title=title,
@@ -66,7 +64,6 @@ def _scheme(
         orders=_no_orders,
         force_evaluations=force_evaluations,
         start="none: it chooses its first step and every other one",
-        explicit=explicit,
         options=(TOLERANCE,),
         # the error below which nothing is promised, whatever the level
         round_off=lambda options, steps: float(options["tolerance"]),
@@ -80,7 +77,6 @@ DOP853 = _scheme(
     "Hairer, Norsett and Wanner I, section II.10",
     "Runge-Kutta",
     12,
-    explicit=True,
 )
 LSODA = _scheme(
     "lsoda",
@@ -88,7 +84,6 @@ LSODA = _scheme(
     "Petzold, SIAM J. Sci. Stat. Comput. 4 (1983)",
     "multistep",
     2,
-    explicit=False,
 )
 RADAU = _scheme(
     "radau",
@@ -96,7 +91,6 @@ RADAU = _scheme(
     "Hairer and Wanner II, section IV.8",
     "implicit Runge-Kutta",
     3,
-    explicit=False,
 )
 
 ADAPTIVE = (DOP853, LSODA, RADAU)

@@ -108,8 +108,6 @@ class Stepper:
     """Whether the velocity differs from the centred difference ``[D_2t u]``."""
     staggered: bool = False
     """Whether velocity and position belong to different times; peaks are then located by ``[D_2t u]``."""
-    implicit: bool = False
-    """Whether a step solves an equation; `step` may then take `slopes`."""
     scaling: Callable[[Floats], tuple[Floats, ...]] | None = None
     """Function of ``w dt`` that returns factors of the acceleration and of the initial velocity; None for 1."""
     events: str = ""
@@ -119,6 +117,11 @@ class Stepper:
     all functions of time."""
     tabulated: bool = False
     """Whether the points are already known and follow the parameters (`vibsim.simulation.adaptive`)."""
+
+    @property
+    def implicit(self) -> bool:
+        """Whether a step solves an equation, for which it takes the slopes of the force."""
+        return "slopes" in inspect.signature(self.step).parameters
 
 
 END_RULES = ("own", "extrapolate", "backward")
@@ -196,7 +199,6 @@ class Scheme:
     counted if None."""
     start: str = "none: a one-step method"
     """How the first step is made, in words."""
-    explicit: bool = True
     symplectic: bool = False
     symmetric: bool = False
     """Whether a step with -dt undoes a step with dt, up to round-off."""
@@ -217,6 +219,11 @@ class Scheme:
     """Newmark parameters of the step on a linear structure; None if the scheme cannot step structures."""
     weighed: tuple[str, ...] = ()
     """Names of the options that apply to structures."""
+
+    @property
+    def explicit(self) -> bool:
+        """Whether no step of a scheme with equal steps solves an equation."""
+        return not self.stepper(self.defaults()).implicit
 
     @property
     def evaluations(self) -> int:
@@ -255,7 +262,7 @@ class Scheme:
 
     def unknowns(self, model: Model) -> int:
         """Return the number of unknowns of an implicit step on a model: the accelerations at all stages."""
-        is_solved = not (self.explicit or self.adaptive) and model.coordinates > 1
+        is_solved = not (self.adaptive or self.explicit) and model.coordinates > 1
         return model.coordinates * self.evaluations if is_solved else 1
 
     def stepper_for(self, model: Model, options: Options) -> Stepper:

@@ -74,9 +74,7 @@ def exact_names(function: Callable[..., Any]) -> Mapping[str, str]:
     return _FORMULAS.get(function, {}) if isinstance(function, FunctionType) else {}
 
 
-def self_starting(
-    step: Callable[..., Any], *, implicit: bool = False, carries_acceleration: bool = False
-) -> Stepper:
+def self_starting(step: Callable[..., Any], *, carries_acceleration: bool = False) -> Stepper:
     """Return the arithmetic of a one-step method from its step (`Stepper.step`): the start is the first step.
 
     The state is (u, v), or (u, v, a) if the acceleration at the end of a step is reused by the next one.
@@ -90,7 +88,7 @@ def self_starting(
         "    return following\n",
         functions={step.__name__: step},
     )
-    stepper = Stepper(start, step, implicit=implicit)
+    stepper = Stepper(start, step)
     if not carries_acceleration:
         return stepper
     return replace(stepper, carried=lambda u, v, a, t, dt: (u(t), v(t), a(t)))

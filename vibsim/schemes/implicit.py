@@ -110,17 +110,14 @@ def step_gauss(state, t, dt, p, acceleration, slopes):
     return (u + dt * (v + dt * (D_1 * a_1 + D_2 * a_2)), v + dt * (0.5 * (a_1 + a_2))), v
 """
 
-_BACKWARD_EULER = self_starting(step_backward_euler, implicit=True)
-_CRANK_NICOLSON = self_starting(step_crank_nicolson, implicit=True)
+_BACKWARD_EULER = self_starting(step_backward_euler)
+_CRANK_NICOLSON = self_starting(step_crank_nicolson)
 _BDF2 = Stepper(
     start_bdf2,
     step_bdf2,
-    implicit=True,
     carried=lambda u, v, a, t, dt: (u(t), v(t), u(t - dt), v(t - dt)),
 )
-_GAUSS = self_starting(
-    written(_GAUSS_STEP, _GAUSS_FORMULAS, {"solved_together": solved_together}), implicit=True
-)
+_GAUSS = self_starting(written(_GAUSS_STEP, _GAUSS_FORMULAS, {"solved_together": solved_together}))
 
 BACKWARD_EULER = Scheme(
     kind="backward_euler",
@@ -129,7 +126,6 @@ BACKWARD_EULER = Scheme(
     family="implicit one-step",
     stepper=lambda options: _BACKWARD_EULER,
     orders=lambda options: same_orders(1),
-    explicit=False,
 )
 CRANK_NICOLSON = Scheme(
     kind="crank_nicolson",
@@ -139,7 +135,6 @@ CRANK_NICOLSON = Scheme(
     stepper=lambda options: _CRANK_NICOLSON,
     orders=lambda options: same_orders(2, energy_linear=math.inf, energy_d2t_linear=2),
     even_powers=True,
-    explicit=False,
     symmetric=True,
 )
 BDF2 = Scheme(
@@ -150,7 +145,6 @@ BDF2 = Scheme(
     stepper=lambda options: _BDF2,
     orders=lambda options: same_orders(2, energy_linear=3, energy_d2t_linear=2),
     start="u^1 and v^1, by one step of Crank-Nicolson",
-    explicit=False,
 )
 GAUSS4 = Scheme(
     kind="gauss4",
@@ -161,7 +155,6 @@ GAUSS4 = Scheme(
     orders=lambda options: same_orders(4, energy_linear=math.inf, energy_d2t_linear=2),
     even_powers=True,
     force_evaluations=2,
-    explicit=False,
     symplectic=True,
     symmetric=True,
 )

@@ -84,7 +84,7 @@ def _stepper(beta: str, gamma: str, alpha_m: str = "0", alpha_f: str = "0") -> S
         formulas |= {"OLD_FORCE": f"({alpha_f})/{new}", "OLD": f"({alpha_m})/{new}"}
     text = _STEP.format(**(_AVERAGED if is_averaged else _ALONE))
     step = written(text, formulas, {"solved": solved})
-    return self_starting(step, implicit=True, carries_acceleration=True)
+    return self_starting(step, carries_acceleration=True)
 
 
 def _newmark(options: Options) -> tuple[str, ...]:
@@ -174,7 +174,6 @@ NEWMARK_BETA = Scheme(
     # symmetric with gamma = 1/2 for any beta
     even_powers=lambda quantity, model, options: _is_centred(options),
     start="a^0, from the equation of motion",
-    explicit=False,
     symmetric=True,
 )
 HHT = Scheme(
@@ -193,7 +192,6 @@ HHT = Scheme(
     orders=_averaged_orders,
     even_powers=lambda quantity, model, options: not _damps(options),
     start="a^0, from the equation of motion",
-    explicit=False,
 )
 GENERALIZED_ALPHA = Scheme(
     kind="generalized_alpha",
@@ -211,7 +209,6 @@ GENERALIZED_ALPHA = Scheme(
     orders=_averaged_orders,
     even_powers=lambda quantity, model, options: not _damps(options),
     start="a^0, from the equation of motion",
-    explicit=False,
 )
 
 NEWMARK = (NEWMARK_BETA, HHT, GENERALIZED_ALPHA)

@@ -33,7 +33,7 @@ from vibsim.engine.gather import OVERFLOW
 from vibsim.engine.kernel import kernel
 from vibsim.models import Model
 from vibsim.schemes.base import Options, Scheme, Stepper
-from vibsim.schemes.code_generation import written
+from vibsim.schemes.code_generation import self_starting, written
 
 MOST_STEPS = 2**20
 """Steps after which a run counts as failed: some minutes of work."""
@@ -274,9 +274,13 @@ def _right_hand_side(problem: Problem) -> tuple[Callable[..., Any], Callable[...
     return right, jacobian
 
 
+def _at_rest(state: Any, t: float, dt: float, p: Any, acceleration: Any, slopes: Any) -> Any:
+    """Take a step in which nothing moves, for a kernel that has the acceleration and its slopes."""
+    return state, state[1]
+
+
 @cache
 def _forces(model: Model) -> tuple[Callable[..., float], Callable[..., tuple[float, float]]]:
     """Return the acceleration of a model and its slopes, as Python functions of (u, v, t, p)."""
-    stepper = replace(along_a_table(model.coordinates), implicit=True)
-    plain: Any = kernel(model, stepper, "plain", False)
+    plain: Any = kernel(model, self_starting(_at_rest), "plain", False)
     return plain.__globals__["acceleration"], plain.__globals__["slopes"]

@@ -61,7 +61,9 @@ def solve(
                 except (SimulationError, TypeError, ValueError) as error:
                     if SCHEMES.built_in.get(method.kind) is method:
                         raise
-                    raise SimulationError(f"scheme {scheme.name}: its step fails: {error}") from error
+                    raise SimulationError(
+                        f"scheme {scheme.name}: its step fails: {error}"
+                    ) from error
                 runs.append((run, where))
                 if link < experiment.chain - 1:
                     initial[where + 1] = run.states[:, :, -1].T

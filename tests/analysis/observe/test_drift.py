@@ -129,7 +129,7 @@ def pushed(state, t, dt, p, acceleration, slopes):  # type: ignore[no-untyped-de
 @pytest.mark.parametrize("steps", [2000, 100_000])
 def test_a_small_drift_is_above_that_rounding(monkeypatch: pytest.MonkeyPatch, steps: int) -> None:
     """RK4 loses p^6/72 at each step; Crank-Nicolson pushed by 1e-12 at each gains that much."""
-    stepper = self_starting(pushed, implicit=True)
+    stepper = self_starting(pushed)
     genuine = SCHEMES["crank_nicolson"]
     broken = replace(genuine, kind="pushed", stepper=lambda options: stepper)
     registered(monkeypatch, broken)
