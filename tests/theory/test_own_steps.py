@@ -1,6 +1,7 @@
 """Theory of steps that somebody else wrote: they iterate, round, and grow in ways that no scheme of vibsim does."""
 
 import math
+from dataclasses import replace
 
 import pytest
 
@@ -145,6 +146,31 @@ def test_coefficients_of_16_digits_have_the_series_of_the_exact_ones():
     checks = [{"converges": f"u_{part}_error", "order": 4} for part in ("phase", "amplitude")]
     for verdict in judged(mine, [7, 8, 9], *checks):
         assert verdict.status == "PASS"
+
+
+OLDER = 0.3310585786300049
+NEWER = 1.0 + OLDER
+
+
+def two_step(state, t, dt, p, acceleration):
+    """Make a step of order 1 whose two weights of old values differ by 1 only to rounding."""
+    u, v, u_before, v_before = state
+    a, rest = acceleration(u, v, t, p), dt * (1.0 - OLDER)
+    x = NEWER * u - OLDER * u_before + rest * v
+    return (x, NEWER * v - OLDER * v_before + rest * a, u, v), v
+
+
+def test_weights_of_16_digits_that_sum_to_1_leave_no_error_without_a_power_of_dt():
+    def start(variant, u, v, dt, p, acceleration):
+        return u + dt * v, v + dt * acceleration(u, v, 0.0, p), u, v
+
+    stepper = Stepper(start, two_step)
+    scheme = replace(own(two_step), stepper=lambda options: stepper)
+    error = dict(theory_rows(scheme, {}, 3))["error"]
+    assert error.startswith("u(t) - u_n = I (-")
+    assert " p t w cos(t w)" in error.partition("+")[0]
+    phase, amplitude = theory.part_orders(stepper, 0.0, 1.0, 0.0)
+    assert (float(phase), float(amplitude)) == (2.0, 1.0)
 
 
 def test_a_step_that_compares_numbers_has_no_series_and_the_order_of_its_position():

@@ -69,7 +69,8 @@ def error_series(stepper: Stepper) -> tuple[Any, Any]:
     from sympy import cos, ring, sin
 
     mode, p, angle = principal_mode(stepper, 0.0), symbol("p"), symbol("w") * symbol("t")
-    formulas, turned = ring("turned", mode.rate.field.domain)
+    field = mode.rate.field
+    formulas, turned = ring("turned", field.domain)
 
     def row(series: Laurent) -> NDArray[Any]:
         """Return the coefficients of the powers of p as polynomials in w t."""
@@ -88,8 +89,13 @@ def error_series(stepper: Stepper) -> tuple[Any, Any]:
         total = total[0] + power[0], total[1] + power[1]
     along, beside = total[0] * -1, total[1]
     along[0] += 1
+
+    def formula(polynomial: Any) -> Any:
+        terms = zip(polynomial.monoms(), field.cleaned(polynomial.coeffs()), strict=True)
+        return formulas.from_dict({power: c for power, c in terms if c}).as_expr(angle)
+
     parts = (
-        one.as_expr(angle) * cos(angle) + other.as_expr(angle) * sin(angle)
+        formula(one) * cos(angle) + formula(other) * sin(angle)
         for one, other in zip(along, beside, strict=True)
     )
     terms = [(p**k, part) for k, part in enumerate(parts) if part != 0]
