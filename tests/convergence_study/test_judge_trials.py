@@ -115,6 +115,33 @@ def test_what_noise_explains_has_a_bound_and_not_the_error_0() -> None:
     assert "The error of the finest level is at most" in verdict.sentence
 
 
+@pytest.mark.parametrize(
+    ("values", "more", "reason"),
+    [
+        ([0.31] * 3, {}, "round_off"),
+        ([0.308712] * 4, {"order": 2}, "round_off"),
+        ([[0.31, 0.32, 0.45]] * 3, {"at_least": 1}, "round_off"),
+        # whole numbers from 100 on count as rounded
+        ([312] * 3, {}, "round_off"),
+        ([0.31] * 3, {"exact": 0.3123}, "round_off"),
+        ([0.31] * 3, {"exact": 0.31}, "exact"),
+        ([0.31] * 3, {"noise": 0.005}, "exact"),
+        ([np.pi] * 3, {}, "exact"),
+        ([3, 3, 3], {}, "exact"),
+    ],
+)
+def test_levels_rounded_to_the_same_few_digits_do_not_pass(
+    values: list[Any], more: dict[str, Any], reason: str
+) -> None:
+    verdict = judge([0.1, 0.05, 0.025, 0.0125][: len(values)], values, **more)
+    assert verdict.reason == reason
+    if reason == "round_off":
+        assert verdict.sentence.startswith(
+            "All levels of u are the same to the last digit that they have, so they do not show its order."
+        )
+        assert "give u with more digits. Check that the solver used h." in verdict.advice
+
+
 def test_levels_that_are_the_same_are_doubted() -> None:
     verdict = judge(H, [1.5, 1.5, 1.5, 1.5], order=2)
     assert verdict.reason == "exact"

@@ -386,6 +386,10 @@ def _decide(
     outcome.logarithm = float(assessment.logarithm[k])
     halves = request.halves(judged_values, places)
     outcome.half = float(halves[-1])
+    is_met = abs(outcome.error) <= MOST_ADDED_UP * outcome.floor
+    if outcome.reason == "exact" and not (request.noise or is_met) and outcome.half > outcome.floor:
+        # before they were rounded to the same few digits, levels may have differed by as much
+        outcome.reason = "round_off"
     if np.isfinite(weights).all():
         # summed one by one, so that a member has the same bits alone and among others
         outcome.best = sum(

@@ -123,6 +123,10 @@ SENTENCES: Mapping[str, tuple[str, str]] = MappingProxyType(
             "The finest differences of {quantity} look like {floor}, so they do not show its order{estimate}.",
             "Use coarser levels, or {less_noise}.",
         ),
+        "same": (
+            "All levels of {quantity} are the same to the last digit that they have, so they do not show its order.",
+            "Use coarser levels, or {less_noise}. Check that the solver used {size}.",
+        ),
         "oscillating": (
             "The differences of {quantity} change sign from level to level, so no order can be read from them.",
             "{finer}, or judge another quantity.",
@@ -140,7 +144,7 @@ SENTENCES: Mapping[str, tuple[str, str]] = MappingProxyType(
 )
 """Templates of sentence and advice by the reasons that levels alone show. ``interpolation`` is the only case of
 ``not_applicable``; ``rounded``, ``contradicted`` and ``logarithm`` are cases of ``pre_asymptotic``, and ``growing`` and
-``blown_up`` are cases of this and of ``round_off``."""
+``blown_up`` are cases of this and of ``round_off``, and so is ``same`` of the latter."""
 
 
 def describe(facts: LadderVerdict, setting: Setting) -> tuple[str, str]:
@@ -154,6 +158,8 @@ def describe(facts: LadderVerdict, setting: Setting) -> tuple[str, str]:
         key = "rounded"
     elif key == "pre_asymptotic" and setting.logarithm is not None:
         key = "logarithm"
+    elif key == "round_off" and not any(level.difference for level in facts.levels):
+        key = "same"
     phrases = _phrases(facts, setting)
     is_moved = key == "pre_asymptotic" or bool(_higher_part(facts))
     sentence, advice = (template.format_map(phrases) for template in SENTENCES[key])
