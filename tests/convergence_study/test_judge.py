@@ -380,7 +380,7 @@ def test_every_reason_has_a_sentence() -> None:
 
     # levels alone do not show these; `not_applicable` is a case of the interpolation
     others = {"match", "mismatch", "unstable", "non_smooth", "not_applicable"}
-    cases = {"interpolation", "growing", "blown_up", "rounded", "contradicted", "logarithm"}
+    cases = {"interpolation", "growing", "blown_up", "rounded", "same", "contradicted", "logarithm"}
     assert set(SENTENCES) == REASONS.keys() - others | cases
     for reason, status in REASONS.items():
         if reason in others:

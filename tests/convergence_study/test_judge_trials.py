@@ -115,6 +115,33 @@ def test_what_noise_explains_has_a_bound_and_not_the_error_0() -> None:
     assert "The error of the finest level is at most" in verdict.sentence
 
 
+@pytest.mark.parametrize(
+    ("values", "more", "reason"),
+    [
+        ([0.31] * 3, {}, "round_off"),
+        ([0.308712] * 4, {"order": 2}, "round_off"),
+        ([[0.31, 0.32, 0.45]] * 3, {"at_least": 1}, "round_off"),
+        # whole numbers from 100 on count as rounded
+        ([312] * 3, {}, "round_off"),
+        ([0.31] * 3, {"exact": 0.3123}, "round_off"),
+        ([0.31] * 3, {"exact": 0.31}, "exact"),
+        ([0.31] * 3, {"noise": 0.005}, "exact"),
+        ([np.pi] * 3, {}, "exact"),
+        ([3, 3, 3], {}, "exact"),
+    ],
+)
+def test_levels_rounded_to_the_same_few_digits_do_not_pass(
+    values: list[Any], more: dict[str, Any], reason: str
+) -> None:
+    verdict = judge([0.1, 0.05, 0.025, 0.0125][: len(values)], values, **more)
+    assert verdict.reason == reason
+    if reason == "round_off":
+        assert verdict.sentence.startswith(
+            "All levels of u are the same to the last digit that they have, so they do not show its order."
+        )
+        assert "give u with more digits. Check that the solver used h." in verdict.advice
+
+
 def test_levels_that_are_the_same_are_doubted() -> None:
     verdict = judge(H, [1.5, 1.5, 1.5, 1.5], order=2)
     assert verdict.reason == "exact"
@@ -169,6 +196,25 @@ def test_an_order_says_behind_which_level_it_is_not_seen() -> None:
 def test_three_levels_that_may_fall_by_accident_fit_one_order() -> None:
     verdict = judge(H[:3], [1 + x**0.35 for x in H[:3]], order=0.35)
     assert "They fit order 0.35 alone, but may do so by accident." in verdict.sentence
+    # the end of y' = -a y + r sin(y) + 1 with a lagged source, with 7, 9, 18 and 36 steps
+    values = [0.8814824049983081, 0.8839508104324965, 0.8883471669912358, 0.8905836043651053]
+    verdict = judge([1 / 7, 1 / 9, 1 / 18, 1 / 36], values, order=1)
+    assert "They fit orders 0.98 to 1.00 alone, but may do so by accident." in verdict.sentence
+
+
+def test_the_finer_level_of_an_advice_counts() -> None:
+    """A level closer than a factor of 1.4 would be left out."""
+    for ratio, finer in ((1.2, 0.05), (1.39, 0.05), (1.5, 0.1 / 1.5), (2.0, 0.05), (4.0, 0.025)):
+        found = judge([0.1 * ratio, 0.1], [1.1, 1.05])
+        assert found.advice == f"Add a level, such as h = {finer:.6g}."
+
+
+def test_noise_is_not_said_to_grow_where_the_finest_difference_is_small() -> None:
+    """The mean of exp(x) over 100, 400, ..., 102400 random x."""
+    values = [1.72637, 1.70333, 1.71357, 1.71491, 1.71975, 1.71868]
+    found = judge([0.1 * 2.0**-k for k in range(6)], values, order=1, exact=np.e - 1)
+    assert found.status == "INCONCLUSIVE"
+    assert "grow" not in found.sentence
 
 
 @pytest.mark.parametrize("h", [H, H[:3], [0.1, 0.07, 0.03]])

@@ -313,11 +313,18 @@ def test_bounds_of_best_values_reach_an_exact_solution_that_the_levels_miss() ->
         model="pendulum",
         initial={"theta": 2.0, "omega": 0.2},
         schemes=[replace(wrong, orders=lambda options: same_orders(4))],
-        checks=[{"value": "end", "quantity": "theta", "at": {"level": "best"}, "below": 1.145125}],
+        checks=[
+            {"value": "end", "quantity": "theta", "at": {"level": "best"}, "below": 1.145125},
+            {"value": "period", "at": {"level": "best"}, "equals": 8.5, "atol": 1e-3},
+        ],
     )
     found = analyse(experiment, [simulate(experiment, level) for level in experiment.levels])
-    (verdict,) = verdicts(experiment, found)
-    assert verdict.status == "INCONCLUSIVE"
+    end, period = verdicts(experiment, found)
+    assert "because the levels approach another solution than the exact one" in period.text
+    for verdict in (end, period):
+        assert verdict.status == "INCONCLUSIVE"
+        assert "Finer levels will not help." in verdict.advice
+        assert "Add level" not in verdict.advice
     for name in ("theta_end", "theta_min", "omega_max"):
         value, bound = (
             found[f"{name}_{kind}"].item() for kind in ("richardson", "richardson_error")

@@ -17,6 +17,7 @@ from vibsim.checks.sentences import (
     FINER,
     MOST_FINER,
     NOT_FINITE,
+    WRONG_LIMIT_ADVICE,
     Description,
     MemberFacts,
     add_levels,
@@ -33,6 +34,7 @@ from vibsim.checks.value import (
     room,
 )
 from vibsim.convergence.differences import last_change
+from vibsim.convergence.reasons import code
 from vibsim.convergence.thresholds import STILL_TO_CHANGE
 from vibsim.core.array_types import Floats
 from vibsim.core.vocabulary import LEVELS_OF_AN_ORDER, is_error_part
@@ -212,6 +214,8 @@ def _why_unknown(f: MemberFacts, check: ValueCheck) -> str:
         if differing := _differing_events(f):
             return f", because the levels differ in their number of events: {differing}"
         return ", because no level tells whether an event happens before the end of the run"
+    if _is_beside_exact(f, check):
+        return ", because the levels approach another solution than the exact one"
     numbers = _by_level_of(f, check)
     if len(numbers) >= LEVELS_OF_AN_ORDER and np.all(np.isfinite(numbers)):
         return ", because its changes do not shrink steadily from level to level"
@@ -266,6 +270,9 @@ def advice_on_bound(f: MemberFacts, check: ValueCheck) -> str:
         return "Use steps shorter than the pulse, or write a wider pulse of the same impulse."
     if _has_few_periods(f, check):
         return f"Give {LEAST_PERIODS} or more `periods:`."
+    if _is_beside_exact(f, check):
+        advice = WRONG_LIMIT_ADVICE.format(scheme=f.scheme_name)
+        return f"The levels approach another solution than the exact one. {advice}"
     if _is_of_events_at_end(f, check):
         if _differing_events(f):
             return (
@@ -281,6 +288,12 @@ def advice_on_bound(f: MemberFacts, check: ValueCheck) -> str:
         key = "periods" if f.experiment.time.periods is not None else "end"
         return f"Make the run longer (`time: {key}`): finer levels do not shrink the error bound."
     return ""
+
+
+def _is_beside_exact(f: MemberFacts, check: ValueCheck) -> bool:
+    """Say whether the levels of the quantity, or of the position, approach another solution than the exact one."""
+    name = f"{check.quantity or f.model.position}_reason"
+    return name in f.record and bool(f.record[name][f.scheme, f.case] == code("wrong_limit"))
 
 
 def _pulse_time(f: MemberFacts) -> float:

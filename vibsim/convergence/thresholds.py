@@ -23,6 +23,10 @@ LEAST_WITH_LIMIT = LOWEST_ORDER - HALF_SPACING  # slower decay does not indicate
 SUPERCONVERGENCE = 2.0  # a superconvergent quantity gains at most the next even power [derived]
 ORDINARY_ORDER = 2.0  # order assumed if a scheme promises none, or exactness [convention]
 STEEPEST = 64.0  # measured orders lie between -STEEPEST and STEEPEST [convention]
+# Smallest ratio of the step sizes that a verdict of `judge` rests on; levels closer together are left out. The two
+# powers of the error model leave a smooth remainder. At close levels it is not the independent misfit that the model
+# assumes, so their many differences would make any order seem certain. [calibrated]
+LEAST_RATIO = 1.4
 PEAKS = 4  # in cosines of the largest norm a point has the weight of its relative size to this power [convention]
 
 # ---- Round-off

@@ -11,11 +11,11 @@ from vibsim.convergence.differences import orders_of_steps
 from vibsim.convergence.extrapolation.thresholds import GCI_TRUSTED
 from vibsim.convergence.study.common_points import CommonValues
 from vibsim.convergence.study.measurement import rounding_of_sizes
-from vibsim.convergence.study.outcomes import LEAST_RATIO, Outcome, Request
+from vibsim.convergence.study.outcomes import Outcome, Request
 from vibsim.convergence.study.refinement import Refinement
 from vibsim.convergence.study.sentences import BEYOND_ROUND_OFF, Setting, describe
 from vibsim.convergence.study.verdict import LadderVerdict, Level
-from vibsim.convergence.thresholds import ABOVE_ROUND_OFF, FLOOR_DECLINE
+from vibsim.convergence.thresholds import ABOVE_ROUND_OFF, FLOOR_DECLINE, LEAST_RATIO
 from vibsim.core.array_types import Floats
 from vibsim.core.vocabulary import LEVELS_OF_AN_ORDER, ORDER_TOLERANCE, REASONS
 from vibsim.elementary import on_arrays

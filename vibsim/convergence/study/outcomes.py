@@ -23,6 +23,7 @@ from vibsim.convergence.study.restriction import polynomials
 from vibsim.convergence.thresholds import (
     ABOVE_ROUND_OFF,
     BLOWN_UP,
+    LEAST_RATIO,
     LEAST_WITH_LIMIT,
     MISSED,
 )
@@ -41,11 +42,6 @@ MOST_ADDED_UP, ADDED_UP = 100.0, 10.0
 
 Bounds include the usual one. On 960 ladders of RK4 and Simpson's rule down to round-off 2 best values miss theirs
 instead of 24, and a tenth of the bounds is more than 1.2 and 4 times as wide."""
-LEAST_RATIO = 1.4
-"""Smallest ratio of the step sizes that a verdict rests on; levels closer together are left out [calibrated].
-
-The two powers of the error model leave a smooth remainder. At close levels it is not the independent misfit that the
-model assumes, so their many differences would make any order seem certain."""
 SMOOTH = 0.05
 """Largest distance of a level from a smooth curve, relative to the differences of the levels [calibrated]."""
 SEEN = 0.1
@@ -386,6 +382,10 @@ def _decide(
     outcome.logarithm = float(assessment.logarithm[k])
     halves = request.halves(judged_values, places)
     outcome.half = float(halves[-1])
+    is_met = abs(outcome.error) <= MOST_ADDED_UP * outcome.floor
+    if outcome.reason == "exact" and not (request.noise or is_met) and outcome.half > outcome.floor:
+        # before they were rounded to the same few digits, levels may have differed by as much
+        outcome.reason = "round_off"
     if np.isfinite(weights).all():
         # summed one by one, so that a member has the same bits alone and among others
         outcome.best = sum(

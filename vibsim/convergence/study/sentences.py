@@ -16,7 +16,8 @@ from vibsim.convergence.study.notation import (
     percent,
     with_bound,
 )
-from vibsim.core.vocabulary import ORDER_TOLERANCE
+from vibsim.convergence.thresholds import LEAST_RATIO
+from vibsim.core.vocabulary import LEVELS_OF_AN_ORDER, ORDER_TOLERANCE
 
 if TYPE_CHECKING:
     from vibsim.convergence.study.verdict import LadderVerdict
@@ -123,6 +124,10 @@ SENTENCES: Mapping[str, tuple[str, str]] = MappingProxyType(
             "The finest differences of {quantity} look like {floor}, so they do not show its order{estimate}.",
             "Use coarser levels, or {less_noise}.",
         ),
+        "same": (
+            "All levels of {quantity} are the same to the last digit that they have, so they do not show its order.",
+            "Use coarser levels, or {less_noise}. Check that the solver used {size}.",
+        ),
         "oscillating": (
             "The differences of {quantity} change sign from level to level, so no order can be read from them.",
             "{finer}, or judge another quantity.",
@@ -140,7 +145,7 @@ SENTENCES: Mapping[str, tuple[str, str]] = MappingProxyType(
 )
 """Templates of sentence and advice by the reasons that levels alone show. ``interpolation`` is the only case of
 ``not_applicable``; ``rounded``, ``contradicted`` and ``logarithm`` are cases of ``pre_asymptotic``, and ``growing`` and
-``blown_up`` are cases of this and of ``round_off``."""
+``blown_up`` are cases of this and of ``round_off``, and so is ``same`` of the latter."""
 
 
 def describe(facts: LadderVerdict, setting: Setting) -> tuple[str, str]:
@@ -154,6 +159,8 @@ def describe(facts: LadderVerdict, setting: Setting) -> tuple[str, str]:
         key = "rounded"
     elif key == "pre_asymptotic" and setting.logarithm is not None:
         key = "logarithm"
+    elif key == "round_off" and not any(level.difference for level in facts.levels):
+        key = "same"
     phrases = _phrases(facts, setting)
     is_moved = key == "pre_asymptotic" or bool(_higher_part(facts))
     sentence, advice = (template.format_map(phrases) for template in SENTENCES[key])
@@ -181,7 +188,10 @@ def describe(facts: LadderVerdict, setting: Setting) -> tuple[str, str]:
 
 def _is_growth(facts: LadderVerdict, setting: Setting) -> bool:
     """Say whether differences grow because levels move apart, and not because of noise."""
-    if not setting.is_growing and (facts.order is None or round(facts.order, 3) >= 0.0):
+    # an estimate of coarser levels, behind which differences change sign, says nothing of the finest ones
+    is_last = facts.levels[-LEVELS_OF_AN_ORDER:][0].order is not None
+    is_negative = facts.order is not None and round(facts.order, 3) < 0.0
+    if not setting.is_growing and not (is_negative and is_last):
         return False
     if facts.reason != "round_off":
         return facts.reason == "pre_asymptotic"
@@ -202,7 +212,9 @@ def _joined(parts: Sequence[str]) -> str:
 def _phrases(facts: LadderVerdict, setting: Setting) -> dict[str, Any]:
     kind, own = setting.interpolation or ("", 0)
     h, count = [level.h for level in facts.levels], len(facts.levels)
-    finer = number(h[-1] * (h[-1] / h[-2] if count > 1 else 0.5), 6)
+    # a verdict leaves out levels that are closer together
+    ratio = h[-2] / h[-1] if count > 1 else 0.0
+    finer = number(h[-1] / (ratio if ratio >= LEAST_RATIO else 2.0), 6)
     # sizes near the limits of double precision may have no finer one
     such_as = f", such as {facts.size_name} = {finer}" if 0.0 < float(finer) < h[-1] else ""
     not_finite = [level.h for level in facts.levels if level.value is None]
@@ -293,11 +305,12 @@ def _interval(facts: LadderVerdict) -> str:
     """Say which orders are consistent with the levels of an open verdict."""
     if facts.reason != "pre_asymptotic" or facts.order_low is None or facts.order_high is None:
         return ""
-    if facts.order_high - facts.order_low < ORDER_TOLERANCE:
-        return f"They fit order {facts.order_low:.2f} alone, but may do so by accident."
     # an order just below 0 is 0
-    low = round(facts.order_low, 2) + 0.0
-    return f"They are consistent with orders from {low:.2f} to {facts.order_high:.2f}."
+    low, high = (round(x, 2) + 0.0 for x in (facts.order_low, facts.order_high))
+    if facts.order_high - facts.order_low >= ORDER_TOLERANCE:
+        return f"They are consistent with orders from {low:.2f} to {high:.2f}."
+    orders = f"order {low:.2f}" if low == high else f"orders {low:.2f} to {high:.2f}"
+    return f"They fit {orders} alone, but may do so by accident."
 
 
 def _finer(facts: LadderVerdict) -> str:
