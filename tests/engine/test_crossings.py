@@ -179,6 +179,20 @@ def test_a_body_that_goes_through_has_one_event_for_each_crossing_in_its_directi
     np.testing.assert_allclose(found.event_time[0, : len(times)], times, atol=far)
 
 
+@pytest.mark.parametrize("events", TREATMENTS)
+@pytest.mark.parametrize("kind", ["ab3", "central", "gauss4"])
+def test_events_that_are_only_counted_leave_the_motion_as_it_is(kind, events):
+    spring = {"spring": "u + u**3"}
+    counted = {**spring, "events.1.when": "u - 0.1", "events.2.falling": "u*v"}
+    still, way = (written(texts, ()) for texts in (spring, counted))
+    with_events = go(way, kind, {}, (1.0, 0.2), 20.0, 400, n_events=9, events=events)
+    assert with_events.events.event_count[0] == 17
+    scheme = FIXED_STEP[kind]
+    numbers = numbers_of_keys({"m": 1.0}, (1.0, 0.2), 20.0 / 400)
+    smooth = integrate(still, scheme, scheme.defaults(), *numbers, 400, 1, lane="plain")
+    assert np.array_equal(with_events.states, smooth.states)
+
+
 def test_who_begins_on_a_guard_goes_to_its_side_by_its_rate():
     for v, count in ((1.0, 2), (-1.0, 1)):
         model = written({"events.1.falling": "u", "spring": "pi**2*u"}, ())

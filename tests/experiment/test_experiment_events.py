@@ -8,6 +8,7 @@ from typing import Any
 import pytest
 from experiment_files import build, only_fault
 
+from vibsim import analyse, simulate, verdicts
 from vibsim.experiment import Experiment
 from vibsim.models.events import Crossings
 from vibsim.report.text.experiment_file import text
@@ -206,3 +207,29 @@ def test_a_faulty_event_beside_the_model_has_one_fault() -> None:
     model = {"kind": "system", "acceleration": "-u"}
     fault = only_fault(model=model, initial={}, schemes=["rk4"], events=[{"when": "3 mm"}])
     assert fault.key == "events[0].when"
+
+
+@pytest.mark.parametrize(
+    "model",
+    [
+        {"kind": "oscillator", "spring": "u"},
+        {"kind": "system", "coordinates": ["u", "z"], "acceleration": {"u": "-u", "z": "-2*z"}},
+    ],
+)
+def test_the_energy_of_a_motion_with_counted_events_is_conserved(model):
+    counted = {**model, "events": [{"when": "u"}]}
+    content = {"title": "x", "initial": {"u": 1.0}, "time": {"end": 30.0, "base_steps": 300}}
+    rest = {"levels": [0, 1, 2], "schemes": ["velocity_verlet"]}
+    experiment = Experiment.from_dict(
+        {
+            **{**content, **rest, "model": counted},
+            "checks": [
+                {"conserves": "energy", "drift": "bounded"},
+                {"converges": "energy_deviation", "order": "scheme"},
+                {"equal": ["velocity_verlet", "exact"], "quantity": "u", "atol": 0.01},
+                {"value": "event_count", "equals": 10},
+            ],
+        }
+    )
+    data = [simulate(experiment, level) for level in experiment.levels]
+    assert [row.status for row in verdicts(experiment, analyse(experiment, data))] == ["PASS"] * 4

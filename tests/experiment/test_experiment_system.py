@@ -118,6 +118,14 @@ def test_a_potential_that_is_not_that_of_the_forces_is_noted(model, potential):
     assert "model.potential: does not give the forces" in note
 
 
+def test_a_potential_is_compared_with_the_forces_where_the_motion_starts():
+    """Between -1 and 1 neither exists."""
+    model = {"acceleration": "2 - log(u - 5)"}
+    right = "-2*u + (u - 5)*log(u - 5) - u"
+    for potential, count in (("-2*u + (u - 5)*log(u - 5)/2 - u", 1), (right, 0)):
+        assert len(read({**model, "potential": potential}, initial={"u": 15.0}).notes) == count
+
+
 @pytest.mark.parametrize(
     ("model", "potential"),
     [

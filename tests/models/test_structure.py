@@ -145,6 +145,11 @@ def test_damping_ratios_are_those_of_the_decay():
     assert float(data["x"][0, 0, -1]) == pytest.approx(np.exp(-w * 0.02 * period), rel=1e-5)
 
 
+def test_a_damping_matrix_of_zeros_is_no_damping():
+    still = {"kind": "structure", **EQUAL, "damping": [[0, 0], [0, 0]]}
+    assert of(still, checks=[{"conserves": "energy"}]).model.definition.conservative
+
+
 def test_a_sweep_of_the_load_has_the_response_of_each_frequency():
     """Undamped from rest: modes decouple in closed form, and members do not depend on each other."""
     sweep = {"model.parameters.w": [0.2, 0.9, 1.3]}

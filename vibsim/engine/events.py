@@ -19,7 +19,7 @@ from vibsim.engine.gather import N_STATS, note_turning
 from vibsim.engine.kernel_stubs import P, State, called, unbound
 
 # bound by the kernel (`vibsim.engine.kernel_stubs`)
-GATHER = LOCATED = WORK = True
+ACT = GATHER = LOCATED = WORK = True
 first_mode = first_of = followed = guard = guard_on_mesh = held = is_at_rest = counts_as_event = (
     unbound
 )
@@ -83,7 +83,7 @@ def passed(
     state
         State of the scheme at step n; meaningless for a member at rest.
     """
-    t = n * dt
+    t, began = n * dt, start_of(p)
     if mode_of(p) == 0.0:
         ahead, own, following = u, held(v), state
     else:
@@ -92,7 +92,9 @@ def passed(
     count = 0
     if LOCATED:
         if guard(ahead, own, t, p) < 0.0:
-            ahead, own, p, count = across(record, variant, n, dt, u, v, p)
+            after, speed, p, count = across(record, variant, n, dt, u, v, p)
+            if ACT:
+                ahead, own = after, speed
         elif GATHER:
             note_piece(record, variant, (u, v, ahead, own, t - dt, dt), p)
     else:
@@ -105,6 +107,9 @@ def passed(
                 note_event(record, t, t, came, before, (ahead, own), mode, p)
             p = with_mode(p, mode, t)
             count = 1
+    if not ACT:
+        # the motion goes on as if nothing had happened
+        p, count = with_mode(p, mode_of(p), began), 0
     p = with_mode(p, followed(ahead, own, t, p), start_of(p))
     if count > 0:
         p = with_mode(p, mode_of(p), t)

@@ -18,6 +18,7 @@ Settings:
 ``STAGED``              a step is cut into stages (`vibsim.engine.stages`)
 ``EVENTS``              the model has events (`vibsim.engine.events`)
 ``LOCATED``             events are located within the step, not noticed at the next grid point
+``ACT``                 events change the motion; otherwise they are only counted
 ``PARAMETERS``          the number of parameters
 ======================  ===============================================================================================
 

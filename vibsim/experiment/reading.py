@@ -22,6 +22,7 @@ from vibsim.experiment.rules.checks import finish_checks
 from vibsim.experiment.rules.figures import check_figures
 from vibsim.experiment.rules.model import Equation
 from vibsim.experiment.rules.model import equation as read_equation
+from vibsim.experiment.rules.potential import note_potential
 from vibsim.experiment.rules.published import check_published
 from vibsim.experiment.rules.scaling import Numbers, characteristic
 from vibsim.experiment.rules.setting import Setting
@@ -193,6 +194,8 @@ def _equation_and_setting(
     knows_schemes = scheme_rules.are_known(document.schemes, report.kinds)
     time = timing.time_spec(document.time, equation.valued, parameters, report)
     initial = _initial(document.initial, equation, registered, report)
+    if equation.valued and any(name.startswith("potential.") for name in equation.formulas):
+        note_potential(equation.valued, parameters, initial, report)
     sweep, is_whole = read_sweep(document, model, schemes, not knows_schemes, report)
     if is_whole:
         _check_members(equation, initial, time, sweep, report)

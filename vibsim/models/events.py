@@ -39,6 +39,11 @@ class _Kind:
     reverses: ClassVar[bool] = False
     """Whether a change of the direction of motion, at which the force jumps, is an event."""
 
+    @property
+    def act(self) -> bool:
+        """Whether events change the motion; otherwise they are only counted."""
+        return True
+
     def smooth(self, accelerations: Sequence[Formula]) -> Sequence[Formula]:
         """Return the accelerations between events."""
         return accelerations
@@ -116,6 +121,11 @@ class Crossings(_Kind):
     rows: tuple[Crossing, ...]
     cost: Formula = "1"
     """Factor of the lost energy: losses at events are counted as energy."""
+
+    @property
+    def act(self) -> bool:
+        """Whether an event changes a state or ends the motion."""
+        return any(row.then or row.ends for row in self.rows)
 
     def guards(self, position: str, velocity: str) -> Guards:
         """Return the formulas that the user wrote."""

@@ -161,14 +161,10 @@ def oscillator(
     if user.term == COULOMB:
         more = _friction(user, forces)
     elif user.crossings is not None:
-        more = {
-            "linear": False,
-            "conservative": False,
-            "exact": None,
-            "exact_period": None,
-            "scales": lambda forces: None,
-            "events": user.crossings,
-        }
+        more = {"scales": lambda forces: None, "events": user.crossings}
+        if user.crossings.act:
+            unknown = {"exact": None, "exact_period": None}
+            more |= {"linear": False, "conservative": False, **unknown}
     elif user.manufactured is not None:
         more = {"exact": user.manufactured.exact, "start": user.manufactured.start}
     return mechanical(

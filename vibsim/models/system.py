@@ -121,8 +121,10 @@ def system(
         more |= {"linear": False, "highest_frequency": own.highest_frequency}
         more["superposed"] = is_conservative and _has_constant_slopes(own)
     if own.crossings is not None:
-        is_conservative = False
-        more |= {"linear": False, "superposed": False, "events": own.crossings}
+        more["events"] = own.crossings
+        if own.crossings.act:
+            is_conservative = False
+            more |= {"linear": False, "superposed": False}
     first, *rest = own.accelerations
     return Model(
         kind="system",

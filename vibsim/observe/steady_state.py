@@ -21,6 +21,7 @@ oscillators; L. N. Trefethen, J. A. C. Weideman, The exponentially convergent tr
 from __future__ import annotations
 
 import itertools
+from collections.abc import Mapping
 
 import numpy as np
 
@@ -92,17 +93,19 @@ def section(block: MemberBlock, level: int, quantity: str) -> Floats:
     return take(block.grid, block.records[level], quantity)[..., :-1:n]
 
 
-def is_angle(model: Model, group: Members, position: str) -> Flags:
-    """Tell where a position matters, and accelerations are the same a turn further, shape (case,)."""
+def is_angle(model: Model, group: Members, position: str, sizes: Mapping[str, Floats]) -> Flags:
+    """Tell where a position matters, and accelerations are the same a turn further, shape (case,).
+
+    They are compared at random states of the sizes of the motion, shape (case,) each.
+    """
     accelerations = [tree(model, formula) for formula in model.accelerations]
     matters = any(position in formula.names for formula in accelerations)
     if position not in model.positions or not matters or model.lookup is not None:
         return np.zeros(len(group.end), dtype=bool)
     rng, shape = np.random.default_rng(21), (len(group.end), TESTS)
-    numbers = {
-        name: rng.uniform(-1.0, 1.0, TESTS) for name in (*model.positions, *model.velocities, "t")
-    }
-    numbers |= group.by_name(model)
+    states = (*model.positions, *model.velocities)
+    numbers = {name: sizes[name][:, None] * rng.uniform(-1.0, 1.0, TESTS) for name in states}
+    numbers |= {"t": rng.uniform(-1.0, 1.0, TESTS), **group.by_name(model)}
     found, moved = (
         np.stack([np.broadcast_to(x, shape) for x in values_of(accelerations, changed)])
         for changed in (numbers, {**numbers, position: numbers[position] + TURN})
@@ -122,7 +125,8 @@ def section_period(block: MemberBlock, level: int) -> Floats:
     rows = rows[..., rows.shape[-1] // 2 :]
     period = np.zeros(block.shape)
     size = np.max(np.abs(rows), axis=-1, initial=0.0)
-    is_turned = np.stack([is_angle(block.model, block.group, name) for name in states])
+    sizes = dict(zip(states, np.max(size, axis=1), strict=True))
+    is_turned = np.stack([is_angle(block.model, block.group, name, sizes) for name in states])
     turn = np.where(is_turned, TURN, np.inf)[:, None, :, None]
     size = np.minimum(size, 0.5 * turn[..., 0])
     for k in range(rows.shape[-1] // 2, 0, -1):

@@ -258,5 +258,22 @@ def test_what_is_an_angle_of_one_member_need_not_be_one_of_another() -> None:
             "sweep": {"model.parameters.c": [0.0, 0.1, 0.0]},
         }
     )
-    found = is_angle(experiment.model.definition, members(experiment, 0, 3), "u")
+    sizes = {"u": np.full(3, 0.2), "v": np.full(3, 0.2)}
+    found = is_angle(experiment.model.definition, members(experiment, 0, 3), "u", sizes)
     assert found.tolist() == [True, False, True]
+
+
+def test_a_position_is_an_angle_if_its_whole_motion_repeats_after_a_turn() -> None:
+    """It leaves out a stop that only far positions touch, and a spring that is soft beyond a thousandth."""
+    stop = {"kind": "system", "acceleration": "-sin(u) - 100*max(u - 20, 0)"}
+    soft = {"kind": "system", "acceleration": "-1e4*u*exp(-1e6*u**2)"}
+    for system, size, expected in ((stop, 1.0, True), (stop, 30.0, False), (soft, 1e-3, False)):
+        experiment = Experiment.from_dict(
+            {
+                **{"title": "x", "model": system, "initial": {"u": 0.2}, "schemes": ["rk4"]},
+                **{"time": {"end": 1.0}, "levels": [1, 2]},
+            }
+        )
+        sizes = {"u": np.array([size]), "v": np.array([1.0])}
+        found = is_angle(experiment.model.definition, members(experiment, 0, 1), "u", sizes)
+        assert found.tolist() == [expected]

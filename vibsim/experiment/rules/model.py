@@ -13,7 +13,7 @@ from vibsim.experiment.data import ModelSpec, StructureSpec, TableSpec
 from vibsim.experiment.faults import Report
 from vibsim.experiment.kinds import COORDINATES
 from vibsim.experiment.rules.formulas import NAME, FormulaReader
-from vibsim.experiment.rules.potential import NOT_FOUND, check_potential, note_potential
+from vibsim.experiment.rules.potential import NOT_FOUND, check_potential
 from vibsim.experiment.rules.structure import read_structure
 from vibsim.experiment.schema.fields import AT, DECLARED, Section
 from vibsim.formula import ExpressionError, derivative, parts_of
@@ -163,8 +163,6 @@ def _equation_of_formulas(section: Any, model: Model, folder: Path, report: Repo
         report.note(("model",), NOT_FOUND, hint)
     if any(row.name == "spring" for row in model.formulas):
         check_potential(equipped, parameters, texts, report)
-    elif any(name.startswith("potential.") for name in texts):
-        note_potential(equipped, parameters, report)
     return Equation(equipped, parameters, texts, tables)
 
 

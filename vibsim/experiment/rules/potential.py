@@ -57,8 +57,10 @@ def check_potential(
             report.add(("model", "spring"), rule, hint)
 
 
-def note_potential(model: Model, parameters: Mapping[str, float], report: Report) -> None:
-    """Note a written potential energy V of a system that is not that of its forces F.
+def note_potential(
+    model: Model, parameters: Mapping[str, float], start: Mapping[str, float], report: Report
+) -> None:
+    """Note a written potential energy V of a system that is not that of its forces F, at states around the start.
 
     At rest the derivative of the power dE/dt with respect to the velocities is grad V - F. If its Jacobian with respect
     to the positions is symmetric and not 0, the remaining forces have a potential, which V lacks. Damping, driving,
@@ -73,7 +75,9 @@ def note_potential(model: Model, parameters: Mapping[str, float], report: Report
         for of, first in ((power, v), (energy, x))
     )
     rng = np.random.default_rng(21)
-    numbers = {name: rng.uniform(-1.0, 1.0, TESTS) for name in x}
+    largest = max(abs(start[name]) for name in x) or 1.0
+    sizes = {name: abs(start[name]) or largest for name in x}
+    numbers = {name: start[name] + sizes[name] * rng.uniform(-1.0, 1.0, TESTS) for name in x}
     numbers |= {row.name: np.full(TESTS, parameters[row.key]) for row in model.parameters}
     numbers |= dict.fromkeys(v, np.zeros(TESTS))
     if any(formula.names - numbers.keys() for formula in forces) or energy.names & set(v):

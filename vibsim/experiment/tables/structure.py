@@ -189,12 +189,13 @@ def assemble(spec: StructureSpec, folder: Path, ratio: float | None = None) -> A
     shapes = np.array([own.vector(key, size) for key in loads]).reshape(len(loads), size)
     histories = own.histories()
     start = [_started(own, key, structure, observed) for key in STARTS]
+    damping = matrices.get("damping")
     if own.faults:
         return own
     own.structure = Structure(
         mass=mass,
         stiffness=stiffness,
-        damping=matrices.get("damping"),
+        damping=damping if damping and damping.entries.size else None,
         ratios=spec.ratios,
         names=tuple(name for name, _ in spec.observe),
         observed=observed,
