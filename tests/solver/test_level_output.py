@@ -99,9 +99,17 @@ def test_a_missing_variable_and_a_missing_coordinate_are_named(read: Read) -> No
         read(dataset().drop_vars("x"))
 
 
-def test_a_function_must_return_a_dataset() -> None:
-    with pytest.raises(VibsimError, match=r"of type float, and must return an xarray\.Dataset"):
-        level_output.from_dataset(1.0, WANTED)
+@pytest.mark.parametrize("value", [1.0, {"flux": X}], ids=["number", "array"])
+def test_a_function_must_return_a_dataset_or_numbers(value: Any) -> None:
+    with pytest.raises(VibsimError, match=r"must return an xarray\.Dataset or a dict of numbers"):
+        level_output.from_dataset(value, WANTED)
+
+
+def test_a_function_may_return_numbers_by_name() -> None:
+    found = level_output.from_dataset({"flux": 2.5, "other": 1}, {"flux": WANTED["flux"]})
+    assert {name: float(grid.values) for name, grid in found.items()} == {"flux": 2.5}
+    with pytest.raises(VibsimError, match="flux: the dataset has no such variable: did you mean"):
+        level_output.from_dataset({"fluxes": 2.5}, {"flux": WANTED["flux"]})
 
 
 def table(folder: Path, text: str, wanted: Any = None) -> dict[str, GridValues]:

@@ -47,10 +47,19 @@ def read(path: Path, quantities: Quantities, *, is_shown: bool = True) -> dict[s
 
 
 def from_dataset(dataset: Any, quantities: Quantities) -> dict[str, GridValues]:
-    """Return the quantities in a function's result; raise VibsimError where one is missing or has other coordinates."""
+    """Return the quantities in a function's result; raise VibsimError where one is missing or has other coordinates.
+
+    The result is a Dataset, or a mapping with a number for each name.
+    """
     if not hasattr(dataset, "data_vars"):
-        kind = type(dataset).__name__
-        raise VibsimError(f"returned a value of type {kind}, and must return an xarray.Dataset")
+        if not isinstance(dataset, Mapping) or any(map(np.ndim, dataset.values())):
+            kind = type(dataset).__name__
+            raise VibsimError(
+                f"returned a value of type {kind}, and must return an xarray.Dataset or a dict of numbers"
+            )
+        import xarray as xr
+
+        dataset = xr.Dataset(dataset)
     values = {}
     for name, row in quantities.items():
         if name not in dataset.variables:
