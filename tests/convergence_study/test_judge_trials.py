@@ -126,11 +126,16 @@ def test_what_noise_explains_has_a_bound_and_not_the_error_0() -> None:
         ([0.31] * 3, {"exact": 0.3123}, "round_off"),
         ([0.31] * 3, {"exact": 0.31}, "exact"),
         ([0.31] * 3, {"noise": 0.005}, "exact"),
-        ([np.pi] * 3, {}, "exact"),
+        # a solver that does not use the step size makes the same levels
+        ([np.pi] * 3, {}, "round_off"),
+        ([[np.pi, 0.1 + 0.2]] * 3, {"order": 2}, "round_off"),
+        ([np.float32(0.1)] * 3, {}, "round_off"),
+        ([np.pi] * 3, {"exact": np.pi}, "exact"),
+        ([np.pi, np.pi, np.nextafter(np.pi, 4)], {}, "exact"),
         ([3, 3, 3], {}, "exact"),
     ],
 )
-def test_levels_rounded_to_the_same_few_digits_do_not_pass(
+def test_levels_that_are_the_same_do_not_pass(
     values: list[Any], more: dict[str, Any], reason: str
 ) -> None:
     verdict = judge([0.1, 0.05, 0.025, 0.0125][: len(values)], values, **more)
@@ -139,7 +144,14 @@ def test_levels_rounded_to_the_same_few_digits_do_not_pass(
         assert verdict.sentence.startswith(
             "All levels of u are the same to the last digit that they have, so they do not show its order."
         )
-        assert "give u with more digits. Check that the solver used h." in verdict.advice
+        assert "Check that the solver used h. If it did, use coarser levels, or " in verdict.advice
+
+
+@pytest.mark.parametrize(
+    ("value", "end"), [(0.31, "give u with more digits."), (np.pi, "state the exact value.")]
+)
+def test_levels_that_are_the_same_are_told_what_would_show_more(value: float, end: str) -> None:
+    assert judge(H[:3], [value] * 3).advice.endswith(end)
 
 
 def test_levels_that_are_the_same_are_doubted() -> None:

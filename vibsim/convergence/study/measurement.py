@@ -9,7 +9,7 @@ from decimal import Decimal
 import numpy as np
 
 from vibsim.convergence.error_model.ladder import Ladder
-from vibsim.core.array_types import Floats
+from vibsim.core.array_types import Flags, Floats
 
 SINGLE = float(np.finfo(np.float32).eps)
 """Relative spacing of single precision."""
@@ -83,18 +83,22 @@ def half_last_digits(
             digits = max(digits, len(number.as_tuple().digits))
         if size - last >= few:
             return none
-    with np.errstate(over="ignore"):
-        are_binary = sampled * BINARY == np.rint(sampled * BINARY)
-        is_whole = np.all(sampled == np.rint(sampled))
-    if np.all(are_binary) and not (largest >= COUNTED if is_whole else of_binary):
+    is_binary, is_whole = are_binary(sampled), np.all(sampled == np.rint(sampled))
+    if np.all(is_binary) and not (largest >= COUNTED if is_whole else of_binary):
         return none
     units = np.full(len(values), min(last, 0) if is_whole else last)
     if not is_whole:
         # 0.5 or 1 may be exact
-        own = np.max(np.where(are_binary, 0.0, np.abs(sampled)), axis=1)
+        own = np.max(np.where(is_binary, 0.0, np.abs(sampled)), axis=1)
         sizes = [Decimal(repr(x)).adjusted() if x else last for x in own.tolist()]
         units = np.maximum(units, np.array(sizes) - digits + 1)
     return np.array([_half_unit(unit) for unit in units.tolist()])
+
+
+def are_binary(values: Floats) -> Flags:
+    """Say which values are multiples of 1/`BINARY`, such as 0.125 or 3, which may be exact."""
+    with np.errstate(over="ignore"):
+        return np.asarray(values * BINARY == np.rint(values * BINARY))
 
 
 def _half_unit(exponent: int) -> float:

@@ -15,6 +15,7 @@ from vibsim.convergence.reasons import is_one_of
 from vibsim.convergence.study.measurement import (
     SINGLE,
     Measurement,
+    are_binary,
     half_last_digits,
     measurement,
     step_of_values,
@@ -382,9 +383,14 @@ def _decide(
     outcome.logarithm = float(assessment.logarithm[k])
     halves = request.halves(judged_values, places)
     outcome.half = float(halves[-1])
-    is_met = abs(outcome.error) <= MOST_ADDED_UP * outcome.floor
-    if outcome.reason == "exact" and not (request.noise or is_met) and outcome.half > outcome.floor:
-        # before they were rounded to the same few digits, levels may have differed by as much
+    is_same = not np.any(np.diff(finite_values, axis=0))
+    # they may have differed before they were rounded to few digits; a calculation that is exact but for rounding
+    # leaves other last bits on each level, and one that does not use the step size the same
+    shows_nothing = outcome.half > outcome.floor or (
+        is_same and not np.all(are_binary(finite_values))
+    )
+    is_known = bool(request.noise) or abs(outcome.error) <= MOST_ADDED_UP * outcome.floor
+    if outcome.reason == "exact" and shows_nothing and not is_known:
         outcome.reason = "round_off"
     if np.isfinite(weights).all():
         # summed one by one, so that a member has the same bits alone and among others
@@ -392,7 +398,7 @@ def _decide(
             (w * row for w, row in zip(weights, judged_values, strict=True)), 0.0 * judged_values[0]
         )
         # levels that are the same to the last digit of double precision show no rounding that adds up
-        may_add_up = measured.epsilon[k] >= SINGLE or bool(np.any(np.diff(judged_values, axis=0)))
+        may_add_up = measured.epsilon[k] >= SINGLE or not is_same
         added_up = ADDED_UP * measured.epsilon[k] * measured.norms[k, -1] * may_add_up
         step = step_of_values(judged_values)
         units = np.maximum(halves, added_up)

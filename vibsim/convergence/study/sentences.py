@@ -126,7 +126,7 @@ SENTENCES: Mapping[str, tuple[str, str]] = MappingProxyType(
         ),
         "same": (
             "All levels of {quantity} are the same to the last digit that they have, so they do not show its order.",
-            "Use coarser levels, or {less_noise}. Check that the solver used {size}.",
+            "Check that the solver used {size}. If it did, use coarser levels, or {to_see}.",
         ),
         "oscillating": (
             "The differences of {quantity} change sign from level to level, so no order can be read from them.",
@@ -228,6 +228,7 @@ def _phrases(facts: LadderVerdict, setting: Setting) -> dict[str, Any]:
         as_expected = f", {wanted} as expected"
     else:
         wanted, as_expected = "another one", ""
+    value = "value" if facts.is_number else "values"
     less_noise = (
         f"give {facts.quantity} with more digits"
         if setting.are_digits_few
@@ -243,10 +244,11 @@ def _phrases(facts: LadderVerdict, setting: Setting) -> dict[str, Any]:
         "last_used": number(facts.h_used[-1], 6) if facts.h_used else "",
         "as_expected": as_expected,
         "wanted": wanted,
-        "value": "value" if facts.is_number else "values",
+        "value": value,
         "noise": "the stated noise" if setting.is_noise_stated else "round-off",
         "floor": "the stated noise" if setting.is_noise_stated else "round-off or other noise",
         "less_noise": less_noise,
+        "to_see": less_noise if setting.are_digits_few else "state the exact " + value,
         "finer": f"use coarser levels, or {less_noise}"
         if setting.is_noise_seen or setting.are_digits_few
         else f"add a finer level{such_as}",
