@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from vibsim.checks.fields import name_of
 from vibsim.core.vocabulary import BY_TOLERANCE, ORDER_TOLERANCE, SEVERITY, TYPICAL_NORM
 from vibsim.experiment.storage import checked_quantities
 from vibsim.report.data import Ladder, Member, Results
@@ -186,6 +187,14 @@ class CheckedLadder(Ladder):
         """The facts of the worst result."""
         facts: Mapping[str, Any] = self.result.get("facts", {})
         return facts
+
+    def variable(self, field: str) -> str:
+        """Return the name of the variable with a field that the check measured."""
+        return name_of("" if self.asserted is None else self.asserted.id, field)
+
+    def numbers(self, *fields: str) -> list[float]:
+        """Return numbers that the check measured of the member, such as ``growth``."""
+        return [float(self.record.at(self.variable(field), self.member)) for field in fields]
 
     @property
     def is_on_order(self) -> bool:

@@ -11,15 +11,14 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from vibsim.checks.fields import name_of
 from vibsim.core.array_types import Floats
 from vibsim.core.vocabulary import CENTRED, DRIFTS
 from vibsim.experiment.sweep_columns import options_of, recorded_columns
 from vibsim.observe.thresholds import LEAST_PERIODS, LEAST_SAMPLES, STILL
 from vibsim.report import style
-from vibsim.report.data import Member, Results
+from vibsim.report.choice import CheckedLadder
 from vibsim.report.evidence import frame
-from vibsim.report.evidence.frame import brief, evidence, measured, short
+from vibsim.report.evidence.frame import brief, evidence, short
 from vibsim.report.style import Picture
 from vibsim.report.types import Axes, ConservesCheck
 
@@ -53,15 +52,13 @@ class EnergyError:
         return not np.isfinite(self.means).all()
 
 
-def picture(record: Results, check: ConservesCheck, name: str, member: Member) -> Picture | None:
+def picture(checked: CheckedLadder, check: ConservesCheck) -> Picture | None:
     """Draw the running maximum of the energy error beside the drift that a check expects."""
-    series = f"{check.about}_running_max"
+    record, member, series = checked.record, checked.member, f"{check.about}_running_max"
     if series not in record:
         return evidence(f"{member.title}: the largest energy error so far is not stored.")
-    level, kind, rate, power = (
-        measured(record, name, field, member)
-        for field in ("level", "drift", "drift_rate", "drift_power")
-    )
+    level, kind, rate, power = checked.numbers("level", "drift", "drift_rate", "drift_power")
+    (round_off,) = checked.numbers("round_off")
     initial = abs(float(record.at("energy_initial", member)))
     running = record.at(series, member, level=record.levels.index(int(level))).copy()
     experiment = record.experiment
@@ -74,8 +71,8 @@ def picture(record: Results, check: ConservesCheck, name: str, member: Member) -
         expected=check.drift,
         t=record.times(member.case),
         running=running / (initial or 1.0),
-        means=record.at(name_of(name, "window_means"), member) / (initial or 1.0),
-        round_off=measured(record, name, "round_off", member) / (initial or 1.0),
+        means=record.at(checked.variable("window_means"), member) / (initial or 1.0),
+        round_off=round_off / (initial or 1.0),
         power=power,
         rate=rate,
     )

@@ -7,11 +7,10 @@ from typing import Any
 
 import numpy as np
 
-from vibsim.checks.fields import name_of
 from vibsim.report import style
-from vibsim.report.data import Ladder, Member, Results
+from vibsim.report.choice import CheckedLadder
 from vibsim.report.evidence import frame
-from vibsim.report.evidence.frame import brief, evidence, measured, short
+from vibsim.report.evidence.frame import brief, evidence, short
 from vibsim.report.style import Picture
 from vibsim.report.text.assertions import SOLUTIONS
 from vibsim.report.types import EqualCheck
@@ -20,13 +19,11 @@ DIPS = 10.0
 """Percentage of smallest differences, near zeros, that do not set the scale."""
 
 
-def picture(record: Results, check: EqualCheck, name: str, member: Member) -> Picture | None:
+def picture(checked: CheckedLadder, check: EqualCheck) -> Picture | None:
     """Draw the size of the difference of two solutions over time, on a logarithmic scale."""
-    distance = record.at(name_of(name, "distance_over_time"), member)
-    bound, level, most = (
-        measured(record, name, field, member) for field in ("allowed", "level", "distance")
-    )
-    ladder = Ladder(record, check.quantity, member)
+    record, member, ladder = checked.record, checked.member, checked.of(check.quantity)
+    distance = record.at(checked.variable("distance_over_time"), member)
+    bound, level, most = checked.numbers("allowed", "level", "distance")
     second = SOLUTIONS.get(check.second, check.second)
     subject = f"{member.title}, level {level:.0f}: its {ladder.letter}"
     if not np.isfinite(distance).any():

@@ -11,12 +11,10 @@ from dataclasses import replace
 
 import numpy as np
 
-from vibsim.checks.fields import name_of
 from vibsim.core.array_types import Floats
 from vibsim.core.vocabulary import DECISIVE
 from vibsim.report import style, sweep_layout, words
 from vibsim.report.choice import CheckedLadder
-from vibsim.report.data import Member, Results
 from vibsim.report.evidence import energy, equal, frame, order, stable, value
 from vibsim.report.evidence.frame import GrowthScale, evidence, usable
 from vibsim.report.style import Picture
@@ -42,20 +40,20 @@ def picture(checked: CheckedLadder) -> Picture | None:
     if record.is_lean and draw in (energy.picture, equal.picture, stable.picture):
         draw = _of_members
     with style.applied():
-        drawn = draw(record, asserted.measured, asserted.id, checked.member)
+        drawn = draw(checked, asserted.measured)
     return drawn and replace(drawn, name=f"evidence_{asserted.id}")
 
 
 def _of_members(
-    record: Results, check: StableCheck | ConservesCheck | EqualCheck, name: str, member: Member
+    checked: CheckedLadder, check: StableCheck | ConservesCheck | EqualCheck
 ) -> Picture:
     """Draw the decisive number of all members against the swept value, or against the number of the member."""
-    count = record.count
+    record, member, count = checked.record, checked.member, checked.record.count
     if count == 1:
         return evidence(f"{member.title}: {ALONE}")
 
     def numbers(field: str) -> Floats:
-        return np.asarray(record.pick(name_of(name, field), scheme=member.scheme), np.float64)
+        return np.asarray(record.pick(checked.variable(field), scheme=member.scheme), np.float64)
 
     other_field, remark = BESIDE.get(check.kind, ("", ""))
     values = numbers(DECISIVE[check.kind])
@@ -106,4 +104,4 @@ DRAWN: Mapping[str, Callable[..., Picture | None]] = {
     "stable": stable.picture,
     "value": value.picture,
 }
-"""Kind of a check to its drawing, a function of the record, the check, the id of the check, and member."""
+"""Kind of a check to its drawing, a function of the ladder with the check, and of what it measures."""

@@ -7,10 +7,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from vibsim.checks.fields import name_of
 from vibsim.core.array_types import Floats
 from vibsim.report import frame, style, words
-from vibsim.report.data import Member, Results
 from vibsim.report.style import Picture
 from vibsim.report.types import Axes, Figure
 
@@ -131,11 +129,6 @@ def growth_scale(factors: Floats) -> GrowthScale:
 def usable(values: Floats) -> Floats:
     """Return the positive finite values."""
     return style.finite(values[values > 0.0])
-
-
-def measured(record: Results, check: str, name: str, member: Member) -> float:
-    """Return a number that a check measured for a member, such as ``growth``."""
-    return float(record.at(name_of(check, name), member))
 
 
 def short(value: float) -> str:

@@ -8,7 +8,8 @@ from typing import Any
 import numpy as np
 
 from vibsim.report import style
-from vibsim.report.data import Ladder, Member, Results
+from vibsim.report.choice import CheckedLadder
+from vibsim.report.data import Ladder
 from vibsim.report.evidence import frame
 from vibsim.report.evidence.frame import evidence
 from vibsim.report.figures.order import draw_stated
@@ -17,9 +18,9 @@ from vibsim.report.style import Picture
 from vibsim.report.types import ConvergesCheck, Figure
 
 
-def picture(record: Results, check: ConvergesCheck, name: str, member: Member) -> Picture | None:
+def picture(checked: CheckedLadder, check: ConvergesCheck) -> Picture | None:
     """Draw the rescaled differences over time, if series are stored, and the order by level."""
-    ladder = Ladder(record, check.converges, member)
+    ladder = checked.of(check.converges)
     if not ladder.has("observed_order", check.norm):
         return None
     alt = f"Evidence on the order of {ladder.name}"
@@ -33,10 +34,10 @@ def picture(record: Results, check: ConvergesCheck, name: str, member: Member) -
         _draw_differences(figure, ladder)
     _draw_orders(figure, ladder, check)
     if not has_series:
-        return evidence(f"{member.title}: {right_text}", alt, figure)
+        return evidence(f"{ladder.title}: {right_text}", alt, figure)
     order = ladder.rescaling_order
     how = f"rescaled to coincide where the error has order {order:g}" if order else "as they are"
-    left = f"Left: differences between levels of {member.title}, {how}; the finest pair is the thinnest line."
+    left = f"Left: differences between levels of {ladder.title}, {how}; the finest pair is the thinnest line."
     return evidence(f"{left} Right: {right_text}", alt, figure)
 
 

@@ -15,9 +15,9 @@ from vibsim.convergence.thresholds import BLOWN_UP, LIMIT_ROUNDING
 from vibsim.core.array_types import Floats
 from vibsim.core.vocabulary import HIGHEST
 from vibsim.report import style, words
-from vibsim.report.data import Member, Results
+from vibsim.report.choice import CheckedLadder
 from vibsim.report.evidence import frame
-from vibsim.report.evidence.frame import brief, evidence, measured, short, usable
+from vibsim.report.evidence.frame import brief, evidence, short, usable
 from vibsim.report.style import Picture
 from vibsim.report.types import Axes, Figure, StableCheck
 
@@ -50,15 +50,16 @@ class _Run:
         frame.points(ax, self.levels, values, [i == self.index for i in range(len(self.levels))])
 
 
-def picture(record: Results, _: StableCheck, name: str, member: Member) -> Picture | None:
+def picture(checked: CheckedLadder, _: StableCheck) -> Picture | None:
     """Draw the numbers that decide whether a run is stable, by level."""
-    level, levels = int(measured(record, name, "level", member)), record.levels
+    record, member = checked.record, checked.member
+    level, levels = int(*checked.numbers("level")), record.levels
     p = record.at(HIGHEST if HIGHEST in record else "omega_dt", member)
     limit = float(record.at("stability_limit", member))
     run = _Run(levels, levels.index(level), p, limit, style.canvas(1.0))
     size = record.optional("size_over_exact", ("level",), scheme=member.scheme, case=member.case)
     letter = words.symbol(record.model.position)
-    drawn = [_steps(run), _sizes(run, size, letter), _growths(run, record, member, name)]
+    drawn = [_steps(run), _sizes(run, size, letter), _growths(run, checked)]
     texts = [text for text in drawn if text]
     if not texts:
         return None
@@ -125,15 +126,14 @@ def _sizes(run: _Run, size: Floats, letter: str) -> str:
     return f"{text}, beyond {border}, and no finer level halves that."
 
 
-def _growths(run: _Run, record: Results, member: Member, name: str) -> str:
+def _growths(run: _Run, checked: CheckedLadder) -> str:
     """Draw the measured and predicted growth factors per period; a prediction may be for small oscillations only."""
-    observed, predicted = (
-        np.array(record.at(f"{origin}_growth", member)) for origin in ("measured", "theory")
-    )
+    names = "measured_growth", "theory_growth"
+    observed, predicted = (np.array(checked.record.at(name, checked.member)) for name in names)
     is_near = not math.isfinite(predicted[run.index])
     for values, field in ((observed, "growth"), (predicted, "predicted_growth")):
         if not math.isfinite(values[run.index]):
-            values[run.index] = measured(record, name, field, member)
+            (values[run.index],) = checked.numbers(field)
     both = usable(np.concatenate([observed, predicted]))
     if not both.size:
         return ""

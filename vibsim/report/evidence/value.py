@@ -10,7 +10,6 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from vibsim.checks.fields import name_of
 from vibsim.checks.number_units import unit_of_norm
 from vibsim.checks.value_text import what
 from vibsim.core.array_types import Floats
@@ -18,14 +17,15 @@ from vibsim.core.vocabulary import OF_LEVEL
 from vibsim.experiment.value_names import OF_ONE_MEMBER
 from vibsim.observe.steady_state import continued
 from vibsim.report import style, words
-from vibsim.report.data import Ladder, Member, Results, pretty_unit
+from vibsim.report.choice import CheckedLadder
+from vibsim.report.data import pretty_unit
 from vibsim.report.evidence import frame
-from vibsim.report.evidence.frame import evidence, measured
+from vibsim.report.evidence.frame import evidence
 from vibsim.report.style import Picture
 from vibsim.report.types import AccurateCheck, Axes, ValueCheck
 
 
-def picture(record: Results, check: ValueCheck, name: str, member: Member) -> Picture | None:
+def picture(checked: CheckedLadder, check: ValueCheck) -> Picture | None:
     """Draw a number by level, or its distance from the one that it should equal.
 
     None if no level has it, or all have the number expected.
@@ -33,10 +33,10 @@ def picture(record: Results, check: ValueCheck, name: str, member: Member) -> Pi
     if check.take not in OF_ONE_MEMBER:
         # the check is not on a number of a single member
         return None
-    by_level = _values(record, check, name, member)
+    by_level = _values(checked, check)
     if by_level is None or not np.isfinite(by_level[0]).any():
         return None
-    row = _row(record, check, name, member, by_level[0])
+    row = _row(checked, check, by_level[0])
     if check.number.is_angle:
         near = row.values[-1] if check.equals is None else check.equals
         row = replace(row, values=continued(row.values, near))
@@ -85,11 +85,10 @@ def _number_title(check: ValueCheck) -> str:
     return f"{text} up to {f't = {check.at.t:g}' if check.at.t is not None else f'step {check.at.step}'}"
 
 
-def _values(
-    record: Results, check: ValueCheck, name: str, member: Member
-) -> tuple[Floats, str] | None:
+def _values(checked: CheckedLadder, check: ValueCheck) -> tuple[Floats, str] | None:
     """Return a number on every level with its unit; None if the record lacks it."""
-    if (field := name_of(name, "value_by_level")) in record:
+    record, member = checked.record, checked.member
+    if (field := checked.variable("value_by_level")) in record:
         return record.at(field, member), record.unit_of_number(check)
     if check.at.t is not None or check.at.step is not None:
         return None
@@ -138,24 +137,22 @@ class ByLevel:
         return evidence(caption, ax.get_title(loc="left"), ax.get_figure(root=True))
 
 
-def _row(record: Results, check: ValueCheck, name: str, member: Member, values: Floats) -> ByLevel:
+def _row(checked: CheckedLadder, check: ValueCheck, values: Floats) -> ByLevel:
     """Return the numbers of the levels, and after them the extrapolated one if the check judges that."""
-    levels = record.levels
+    levels, title = checked.record.levels, checked.title
     if check.at.level != "best":
         valid = check.number.own_levels(levels) or levels
         judged = valid[-1] if check.at.level is None else check.at.level
-        return ByLevel(levels, values, [level == judged for level in levels], member.title)
-    best, bound = (measured(record, name, field, member) for field in ("value", "error_bound"))
+        return ByLevel(levels, values, [level == judged for level in levels], title)
+    best, bound = checked.numbers("value", "error_bound")
     counts = [False] * len(levels) + [True]
-    return ByLevel(levels, np.append(values, best), counts, member.title, bound)
+    return ByLevel(levels, np.append(values, best), counts, title, bound)
 
 
-def of_error(record: Results, check: AccurateCheck, name: str, member: Member) -> Picture | None:
+def of_error(checked: CheckedLadder, check: AccurateCheck) -> Picture | None:
     """Draw the errors of the levels; None if that of the finest level is unknown."""
-    error, bound, size = (
-        measured(record, name, field, member) for field in ("error", "error_bound", "size")
-    )
-    levels, ladder = record.levels, Ladder(record, check.accurate, member)
+    error, bound, size = checked.numbers("error", "error_bound", "size")
+    levels, ladder = checked.record.levels, checked.of(check.accurate)
     scale = size if check.is_relative else 1.0
     errors = np.array(ladder.optional("error_norm", ("level",)))
     errors[-1] = error
@@ -163,14 +160,14 @@ def of_error(record: Results, check: AccurateCheck, name: str, member: Member) -
         return None
     shown, most = errors / scale, bound / scale
     title = f"error of {ladder.letter}"
-    measure = pretty_unit(unit_of_norm(record, check.accurate))
+    measure = pretty_unit(unit_of_norm(checked.record, check.accurate))
     title = f"relative {title}" if check.is_relative else style.label(title, measure)
-    row = ByLevel(levels, shown, [level == levels[-1] for level in levels], member.title)
+    row = ByLevel(levels, shown, [level == levels[-1] for level in levels], checked.title)
     ax = row.panel(title, shown, np.array([most, check.accuracy]), is_log=True)
     frame.below(ax, check.accuracy)
     ax.plot([levels[-1]] * 2, [shown[-1], most], color=frame.COLOUR, linewidth=1.5)
     caption = (
-        f"{member.title}: the error in the L2 norm over time; filled at the finest level, with a bar up to its bound. "
+        f"{checked.title}: the error in the L2 norm over time; filled at the finest level, with a bar up to its bound. "
         "Grey: what the check asks for."
     )
     alt = f"Evidence on the error of {ladder.name}"
