@@ -13,12 +13,9 @@ from typing import NamedTuple
 from vibsim.core.array_types import Floats
 
 NUMERICAL, EXACT, BOTH, AXIS = "+", "o", "*", "|"
-LINES_PER_PERIOD = 20
-"""Most lines per period."""
-_LABELS = 24
-"""Columns for the labels: the time and the number of periods."""
-_LEAST, _MOST = 12, 72
-"""Smallest and largest number of columns of the plot itself."""
+LINES_PER_PERIOD = 20  # most lines per period
+_LABELS = 24  # columns for the labels: the time and the number of periods
+_LEAST, _MOST = 12, 72  # smallest and largest number of columns of the plot itself
 
 
 class Series(NamedTuple):
@@ -26,14 +23,10 @@ class Series(NamedTuple):
 
     name: str
     unit: str
-    t: Floats
-    """Times, shape (t,), in s."""
-    values: Floats
-    """The numerical solution at these times; not finite where it broke down."""
-    exact: Floats | None
-    """The exact solution at these times, or a reference; None if unknown."""
-    period: float
-    """Period in s; not finite if there is none."""
+    t: Floats  # times, shape (t,), in s
+    values: Floats  # the numerical solution at these times; not finite where it broke down
+    exact: Floats | None  # the exact solution at these times, or a reference; None if unknown
+    period: float  # period in s; not finite if there is none
     name_of_exact: str = "exact"
 
 

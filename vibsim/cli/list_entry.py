@@ -18,8 +18,7 @@ if TYPE_CHECKING:
 
 COORDINATES = "1 to 64 names; the velocity of x is vx, that of u alone v"
 _WIDEST = 100
-Row = tuple[str, str]
-"""A label, empty for a further row of the same label, and a text."""
+Row = tuple[str, str]  # a label, empty for a further row of the same label, and a text
 
 
 def in_full(what: str, name: str) -> list[str]:

@@ -23,12 +23,9 @@ from vibsim.plan.jobs import DIGEST
 from vibsim.store import seal
 from vibsim.store.atomic import write_text
 
-INDEX = ""
-"""Key of the files that cover all experiments."""
-OVER_ALL = ("index.html", "summary.csv")
-"""Files of the index."""
-BESIDE = ("figures", "tables")
-"""Folders of a report; the plan does not know the files in them."""
+INDEX = ""  # key of the files that cover all experiments
+OVER_ALL = ("index.html", "summary.csv")  # files of the index
+BESIDE = ("figures", "tables")  # folders of a report; the plan does not know the files in them
 _NAME = re.compile(
     r"level_\d{2,}\.nc|level_\d{2,}/shard_\d{4,}\.nc|convergence\.nc|best\.nc|summary\.(?:json|csv)"
     r"|(?:report|index)\.html|(?:figures|tables)/[^/\0.][^/\0]*"
@@ -41,15 +38,11 @@ class Entry(NamedTuple):
     """The state of a file when it was made."""
 
     size: int
-    time: int
-    """Time of the last change [ns]."""
+    time: int  # time of the last change [ns]
     inode: int
-    digest: str
-    """SHA-256 of the content; for a sealed netCDF file the one in its seal."""
-    job: str
-    """Digest of the job that made the file; empty for the index."""
-    machine: str
-    """The machine that made the file, as `machine` returns it."""
+    digest: str  # SHA-256 of the content; for a sealed netCDF file the one in its seal
+    job: str  # digest of the job that made the file; empty for the index
+    machine: str  # the machine that made the file, as `machine` returns it
 
     def fits(self, status: os.stat_result) -> bool:
         """Tell whether a file still has the size, time and inode that it had when it was made."""

@@ -13,8 +13,7 @@ from vibsim.core.vocabulary import SEVERITY, is_trap
 
 Entry = Mapping[str, Any]
 """The summary of an experiment, or an entry with an ``error`` in its place; or one of its checks; or a failed job."""
-_NARROWEST = 30
-"""Smallest width of a text, however narrow the terminal."""
+_NARROWEST = 30  # smallest width of a text, however narrow the terminal
 
 
 def in_lines(summaries: Sequence[Entry], columns: int) -> Iterator[str]:

@@ -26,8 +26,7 @@ from vibsim.core.processes import (
     wait_for_signal,
 )
 
-_GRACE = 3.0
-"""Time that a worker has to end by itself [s], and after that its children."""
+_GRACE = 3.0  # time that a worker has to end by itself [s], and after that its children
 _PARENT = "VIBSIM_PARENT"
 
 Work = Callable[[], int]

@@ -14,8 +14,7 @@ from matplotlib.axis import Axis, XAxis, YAxis
 from matplotlib.figure import Figure
 from matplotlib.ticker import FixedFormatter, FixedLocator
 
-MOST_STEPS = 6
-"""Largest number of steps between the numbers of an axis; matplotlib has up to 9."""
+MOST_STEPS = 6  # largest number of steps between the numbers of an axis; matplotlib has up to 9
 
 
 class _NoTicksYet:

@@ -131,10 +131,8 @@ def with_levels(record: Results, candidates: list[Member]) -> list[Member]:
 class CheckedLadder(Ladder):
     """The ladder of the decisive result of a check, with the check; without a check that of the position."""
 
-    entry: Mapping[str, Any] | None = None
-    """The check in the summary."""
-    asserted: Check | None = None
-    """The check in the experiment; None if the tolerance decides."""
+    entry: Mapping[str, Any] | None = None  # the check in the summary
+    asserted: Check | None = None  # the check in the experiment; None if the tolerance decides
 
     @property
     def status(self) -> str:

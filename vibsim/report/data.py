@@ -36,10 +36,8 @@ class Member:
     scheme: int
     case: int
     scheme_name: str
-    case_name: str = ""
-    """Empty without a sweep."""
-    role: str = ""
-    """Why it is shown: ``worst``, ``typical``, or empty."""
+    case_name: str = ""  # empty without a sweep
+    role: str = ""  # why it is shown: ``worst``, ``typical``, or empty
 
     @property
     def place(self) -> tuple[int, int]:

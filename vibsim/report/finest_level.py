@@ -17,14 +17,12 @@ from vibsim.report.style import finite, no_zeros
 
 LAST_PART = 4
 """A settled motion swings no further than its amplitude in the last one of so many parts of the time."""
-SETTLED = 0.1
-"""Largest relative excess of the swing of a settled motion over its amplitude."""
+SETTLED = 0.1  # largest relative excess of the swing of a settled motion over its amplitude
 SWINGS = (
     f"in the last quarter of the run the motion still swings over {100 * SETTLED:g} % further "
     "than this amplitude"
 )
-VARIES = 1e-6
-"""Relative spread below which members share a number."""
+VARIES = 1e-6  # relative spread below which members share a number
 
 
 @dataclass(frozen=True)

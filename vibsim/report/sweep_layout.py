@@ -21,8 +21,7 @@ from vibsim.report.style import LOG_RATIO, label
 LARGEST_TO_SCALE = 1e100  # larger swept values are not drawn to scale
 FEW, LINES = 5, 6
 """Most curves of a sweep over two keys, one for each value of the second, and over more; else it is a map or cloud."""
-UP, DOWN = "going up →", "← going down"
-"""Directions along a path."""
+UP, DOWN = "going up →", "← going down"  # directions along a path
 CELLS = 400  # most cells along each side of a map: more than its pixels can show
 BINS = 8, 100  # fewest and most cells along each side of a map of scattered members
 
@@ -106,8 +105,7 @@ class Grid:
     y: Key
     borders: tuple[Floats, Floats]  # of the cells along x and y
     cell: NDArray[np.intp]  # flat index of every member's cell in the table (y, x), shape (case,)
-    note: str = ""
-    """What a cell shows, if it holds more than one member."""
+    note: str = ""  # what a cell shows, if it holds more than one member
     separatrix: tuple[Floats, Floats] = (np.empty(0), np.empty(0))
     """Points (x, y) where the exact period is infinite."""
 
@@ -175,8 +173,7 @@ def layout_of(record: Results) -> Along | Grid | None:
     return along_of(varying, sweep.follow if sweep is not None else None) or grid_of(varying)
 
 
-Line = tuple[str, NDArray[np.intp]]
-"""Name and members of a line."""
+Line = tuple[str, NDArray[np.intp]]  # name and members of a line
 
 
 @dataclass(frozen=True)

@@ -100,8 +100,7 @@ def name(quantity: str) -> str:
     return f"the {text.replace(' of', f' {letter} of', 1)}" if is_error_part(quantity) else text
 
 
-_LETTERED = NAMES.keys() - {"energy"}
-"""Names that are not English words."""
+_LETTERED = NAMES.keys() - {"energy"}  # names that are not English words
 
 
 def labelled(text: str, quantity: str | None) -> str:
@@ -146,8 +145,7 @@ def badge(check: Mapping[str, Any]) -> str:
     return TRAP if is_trap(check) else BADGES["PASS"]
 
 
-MARKS = TRAP, REFUTED
-"""Badges that are shown beside a verdict: something went wrong, as expected."""
+MARKS = TRAP, REFUTED  # badges that are shown beside a verdict: something went wrong, as expected
 
 
 def marks(checks: Sequence[Mapping[str, Any]]) -> list[tuple[str, int]]:

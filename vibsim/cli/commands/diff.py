@@ -25,13 +25,10 @@ _RESULTS = ("summary.json", "convergence.nc", "report.html")
 class Side(NamedTuple):
     """One of two experiments."""
 
-    content: Mapping[str, Any]
-    """The settings that its results depend on, in normal form."""
+    content: Mapping[str, Any]  # the settings that its results depend on, in normal form
     title: str
-    summary: Mapping[str, Any] | None
-    """Its verdicts; None if there are none for these settings."""
-    command: str = ""
-    """The command that makes them."""
+    summary: Mapping[str, Any] | None  # its verdicts; None if there are none for these settings
+    command: str = ""  # the command that makes them
 
 
 def diff(options: Namespace) -> int:

@@ -25,8 +25,7 @@ if TYPE_CHECKING:
 
 FPS = {"gif": 10.0}
 DEFAULT_FPS, MOST_FPS = 25.0, 100.0
-MOST_GIF_FRAMES = 600
-"""Most frames of a GIF, all of which are in memory before it is written."""
+MOST_GIF_FRAMES = 600  # most frames of a GIF, all of which are in memory before it is written
 DOTS = {"gif": 80.0}
 DEFAULT_DOTS = 120.0  # per inch
 

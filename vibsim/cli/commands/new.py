@@ -29,8 +29,7 @@ EDITOR = "# yaml-language-server: $schema="
 _END, _FIRST, _LAST = 6.0, 6, 9
 _START = 0.5
 """End time, levels, and initial value of the first position: these levels resolve the motion of every model."""
-_WIDEST = 120
-"""Longest line [characters]."""
+_WIDEST = 120  # longest line [characters]
 STRUCTURE = [
     ("  mass: [1.0]", "M: its diagonal, rows, or a .mtx, .npy or .csv file"),
     ("  stiffness: [[1.0]]", "K, of as many rows as M"),

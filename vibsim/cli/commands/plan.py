@@ -21,10 +21,8 @@ from vibsim.plan import Plan
 from vibsim.plan.forecast import RUN_SECONDS
 
 _WIDTHS = (7, 12, 12, 7, 14, 10, 10, 10)
-CORES = usable_cores()
-"""Number of cores that `vibsim run` uses by default."""
-SHORT = 1.0
-"""Time below which a reference solution is not mentioned [s]."""
+CORES = usable_cores()  # number of cores that `vibsim run` uses by default
+SHORT = 1.0  # time below which a reference solution is not mentioned [s]
 _HEAD = ("level", "steps", "kept every", "files", "member-steps", "disk", "memory", "time")
 
 

@@ -28,8 +28,7 @@ from vibsim.plan import Plan
 from vibsim.store.reading import read_provenance
 
 METADATA = "ro-crate-metadata.json"
-INPUT = Path("experiment")
-"""Folder of the experiment file and of the files that it names."""
+INPUT = Path("experiment")  # folder of the experiment file and of the files that it names
 NO_LICENCE = "No licence is given: ask the authors before you use or share these results."
 _CONTEXT = ["https://w3id.org/ro/crate/1.1/context", {"sha256": "http://schema.org/sha256"}]
 _TYPES = {

@@ -24,8 +24,7 @@ if TYPE_CHECKING:
 
 _LONGEST = 10**6
 """Fractions with larger numerators or denominators are written as decimals, as are roots."""
-_DIGITS, _PRECISE = 8, 40
-"""Digits of decimals in the output, and in the computation."""
+_DIGITS, _PRECISE = 8, 40  # digits of decimals in the output, and in the computation
 
 
 def theory(options: Namespace) -> int:

@@ -28,16 +28,13 @@ from vibsim.plan import Plan, choose
 
 NO_RESULTS = ("logs", "benchmarks")
 """Folders of an experiment that hold the logs and times of its jobs, and no results."""
-TIMESTAMP = ".snakemake_timestamp"
-"""File that Snakemake puts into a folder that a job made."""
+TIMESTAMP = ".snakemake_timestamp"  # file that Snakemake puts into a folder that a job made
 LAST = ("convergence.nc", "summary.json", "report.html")
 """Files that every experiment has when its run ends."""
 _MANIFEST = re.compile(r"\w+\.\w+", re.ASCII)
 """Name of the manifest of an experiment: collection and name, neither of which contains a dot."""
-SHOWN = 8
-"""Most files that are listed by name for the same cause."""
-_README = "README.md"
-"""File in the results folder of a checkout."""
+SHOWN = 8  # most files that are listed by name for the same cause
+_README = "README.md"  # file in the results folder of a checkout
 
 
 def verify(options: Namespace) -> int:

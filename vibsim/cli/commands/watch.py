@@ -14,8 +14,7 @@ from vibsim.cli.jobs.common import refusal, run_command
 from vibsim.core.errors import VibsimError
 from vibsim.experiment.collection import ENDINGS
 
-PAUSE = 0.3
-"""Time between two checks of the files [s]."""
+PAUSE = 0.3  # time between two checks of the files [s]
 _Saved = dict[Path, tuple[int, int, int] | None]
 """Time, size and inode of each file; None for a missing file, since some editors remove a file before they save it."""
 

@@ -27,8 +27,7 @@ from vibsim.plan import Plan
 if TYPE_CHECKING:
     from vibsim.core.record import Record
 
-COMPARED = ("convergence.nc", "summary.json")
-"""Files that the analysis writes."""
+COMPARED = ("convergence.nc", "summary.json")  # files that the analysis writes
 
 
 def chosen_results(options: Namespace) -> Path:

@@ -15,8 +15,7 @@ from vibsim.cli.jobs.common import (
 )
 from vibsim.plan.digests import extrapolated
 
-PART_BYTES = 64 * 10**6
-"""Bytes, over all levels, that an extrapolation reads at a time."""
+PART_BYTES = 64 * 10**6  # bytes, over all levels, that an extrapolation reads at a time
 
 
 def extrapolate(options: Namespace) -> int:

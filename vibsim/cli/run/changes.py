@@ -18,8 +18,7 @@ from vibsim.core.errors import DamagedFileError, FileError, StaleFileError
 from vibsim.plan import Plan
 from vibsim.store.atomic import abandoned
 
-_SEALED = (".nc", ".json")
-"""Files with a seal, which shows whether they are intact."""
+_SEALED = (".nc", ".json")  # files with a seal, which shows whether they are intact
 _LEVEL = re.compile(r"level_\d{2,}")
 _NAMED = re.compile(r"level_\d{2,}(?:/shard_\d{4,})?\.nc|best\.nc")
 

@@ -25,10 +25,8 @@ from vibsim.plan import Plan
 
 _STAGES = 4
 """Most starts of the workflow: one, and one more for each kind of file that may prove damaged or stale."""
-_PAGES = 5
-"""Most experiments for which the path of each report is printed."""
-_NAMED = 5
-"""Most experiments that run again for the same reason and are still listed by name."""
+_PAGES = 5  # most experiments for which the path of each report is printed
+_NAMED = 5  # most experiments that run again for the same reason and are still listed by name
 
 
 def run(options: Namespace) -> int:

@@ -16,8 +16,7 @@ from vibsim.cli.outcome_text import Entry
 from vibsim.cli.terminal import clean
 from vibsim.store import write_text
 
-JOBS = "jobs of the workflow"
-"""Name of the suite of failed jobs."""
+JOBS = "jobs of the workflow"  # name of the suite of failed jobs
 
 
 def check_place(path: Path) -> None:

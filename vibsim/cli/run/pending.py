@@ -11,10 +11,8 @@ from contextlib import contextmanager
 from pathlib import Path
 from threading import Event, Thread
 
-INTERVAL = 60.0
-"""Time between two queries [s]."""
-_LOG, _REASON = 4096, 200
-"""Widths of the columns with the path of the log and with the reason."""
+INTERVAL = 60.0  # time between two queries [s]
+_LOG, _REASON = 4096, 200  # widths of the columns with the path of the log and with the reason
 
 
 @contextmanager

@@ -20,8 +20,7 @@ from vibsim.plan.digests import analysed
 from vibsim.store import read_json
 
 NEW = "not made yet"
-_SHOWN = 3
-"""Number of changes that are listed."""
+_SHOWN = 3  # number of changes that are listed
 _LEVEL = re.compile(r"/level_(\d+)(?:/shard_\d+)?\.nc$")
 _DONE = {"analyse": "analysis", "extrapolate": "extrapolated solution"}
 """Names of the products of jobs, where they differ from the rule name."""

@@ -23,10 +23,8 @@ from snakemake_interface_executor_plugins.executors.base import SubmittedJobInfo
 from snakemake_interface_executor_plugins.executors.remote import RemoteExecutor
 from snakemake_interface_executor_plugins.jobs import JobExecutorInterface
 
-SHARE = 0.2
-"""Ratio of the pause to the mean age of the jobs."""
-LONGEST = 60.0
-"""Longest pause [s], unless the profile requests a longer one."""
+SHARE = 0.2  # ratio of the pause to the mean age of the jobs
+LONGEST = 60.0  # longest pause [s], unless the profile requests a longer one
 
 
 def pause(ages: Sequence[float], shortest: float) -> float:

@@ -31,10 +31,8 @@ _SEARCH_PATHS = (
     *("BASH_ENV", "HDF5_PLUGIN_PATH", "MPLCONFIGDIR"),
 )
 """Environment variables with folders and files from which code or settings are loaded."""
-CANCELLING = 60.0
-"""Time that an executor has to cancel its jobs [s]."""
-_TELLING = 3
-"""Number of finished jobs from which the remaining time is estimated."""
+CANCELLING = 60.0  # time that an executor has to cancel its jobs [s]
+_TELLING = 3  # number of finished jobs from which the remaining time is estimated
 
 
 @dataclass(frozen=True)
@@ -42,13 +40,10 @@ class Job:
     """A job that Snakemake started, or would start."""
 
     rule: str
-    outputs: tuple[str, ...]
-    """The files that it makes, relative to the results folder."""
+    outputs: tuple[str, ...]  # the files that it makes, relative to the results folder
     log: str
-    reason: str
-    """Why it runs; for a failed job the executor's message, if any."""
-    executor_log: str = ""
-    """Path of the executor's log of a failed job; empty if there is none."""
+    reason: str  # why it runs; for a failed job the executor's message, if any
+    executor_log: str = ""  # path of the executor's log of a failed job; empty if there is none
 
     @property
     def simulates(self) -> bool:
@@ -132,12 +127,9 @@ class Outcome:
     jobs: list[Job] = field(default_factory=list)
     """Jobs that Snakemake started, or would start in a dry run."""
     failed: list[Job] = field(default_factory=list)
-    exception: str = ""
-    """Name of the last exception that Snakemake logged; empty without one."""
-    message: str = ""
-    """The message of that exception, with several lines."""
-    text: str = ""
-    """Snakemake's output on stdout and stderr."""
+    exception: str = ""  # name of the last exception that Snakemake logged; empty without one
+    message: str = ""  # the message of that exception, with several lines
+    text: str = ""  # Snakemake's output on stdout and stderr
 
     @property
     def broke(self) -> bool:

@@ -15,8 +15,7 @@ from vibsim.report.style import Picture
 from vibsim.report.text.assertions import SOLUTIONS
 from vibsim.report.types import EqualCheck
 
-DIPS = 10.0
-"""Percentage of smallest differences, near zeros, that do not set the scale."""
+DIPS = 10.0  # percentage of smallest differences, near zeros, that do not set the scale
 
 
 def picture(checked: CheckedLadder, check: EqualCheck) -> Picture | None:

@@ -27,8 +27,7 @@ MOSTLY = 0.5
 CUT_OFF = 10.0
 """Amplitudes and periods beyond this multiple of the exact one are cut off, and the panel says so."""
 
-Run = tuple[str, Member, int]
-"""A curve: label, scheme and member, position of the level."""
+Run = tuple[str, Member, int]  # a curve: label, scheme and member, position of the level
 
 
 def local(record: Results, shown: list[Member], peaks: int = 2) -> Picture | None:

@@ -30,14 +30,12 @@ from vibsim.report.figures.sweeps.view import View
 from vibsim.report.style import Picture
 from vibsim.report.sweep_layout import Along, Grid
 
-FEW_SCHEMES = 3
-"""Most schemes whose figures over time are shown for the decisive quantity."""
+FEW_SCHEMES = 3  # most schemes whose figures over time are shown for the decisive quantity
 MOST_SHOWN = 6
 """Most schemes and members with figures of their own, half as many if there are more schemes; tables have them all."""
 
 Drawn = list[Picture | None]
-Tab = tuple[str, tuple[Picture, ...]]
-"""Figures under one label."""
+Tab = tuple[str, tuple[Picture, ...]]  # figures under one label
 
 
 @dataclass(frozen=True)
@@ -47,8 +45,7 @@ class Gallery:
     motion: tuple[Picture, ...] = ()
     belief: tuple[Tab, ...] = ()
     members: tuple[View, ...] = ()
-    shared: tuple[str, ...] = ()
-    """Sentences on what all members of a sweep share."""
+    shared: tuple[str, ...] = ()  # sentences on what all members of a sweep share
 
 
 def pictures(shown: list[Member], lead: CheckedLadder, first: Sequence[str]) -> Gallery:

@@ -20,8 +20,7 @@ from vibsim.report.figures.moments import UNBOUNDED
 from vibsim.report.style import Picture
 from vibsim.report.types import Axes
 
-MANY_PERIODS = 10.0
-"""A run of more periods is long."""
+MANY_PERIODS = 10.0  # a run of more periods is long
 PERIODS = 4.0  # initial width of the window
 MOST_POINTS = 24_000  # of all curves, about 300 kB
 POINTS_A_PERIOD = 24  # of a curve; longer runs have fewer curves, and then fewer points

@@ -30,10 +30,8 @@ class Curve:
     label: str
     values: Floats
     sound: bool = True  # whether it is above round-off
-    lost: str = ""
-    """Why it is not sound, in words; empty means round-off."""
-    group: str | None = None
-    """Group id of the elements of a page that are switched off together."""
+    lost: str = ""  # why it is not sound, in words; empty means round-off
+    group: str | None = None  # group id of the elements of a page that are switched off together
 
     @property
     def is_whole(self) -> bool:

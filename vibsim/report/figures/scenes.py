@@ -85,14 +85,11 @@ class Part:
     """``line`` and ``spring`` (two points), ``circle`` (centre, radius), ``box`` (centre, sizes), ``arrow`` (start,
     vector), ``arc`` (centre, radius, angle from straight down [degree]), ``track`` (shift of a fixed outline to the
     left)."""
-    look: str
-    """Class of the style sheet."""
+    look: str  # class of the style sheet
     at: tuple[Floats | float, ...]
     """The numbers of the shape, as series of shape (t,) or as constants."""
-    outline: str = ""
-    """Path data of a track."""
-    label: str = ""
-    """Text beside an arrow or an arc."""
+    outline: str = ""  # path data of a track
+    label: str = ""  # text beside an arrow or an arc
 
 
 @dataclass(frozen=True)
@@ -100,8 +97,7 @@ class Scene:
     """A drawing and its legend."""
 
     parts: tuple[Part, ...]
-    legend: tuple[tuple[str, str], ...] = ()
-    """Look and words of the parts in the legend."""
+    legend: tuple[tuple[str, str], ...] = ()  # look and words of the parts in the legend
 
 
 def scene_of(model: Model) -> Callable[[Motion], Scene] | None:

@@ -18,10 +18,8 @@ from vibsim.report.types import Axes
 
 MOST = 6  # most levels that can be told apart
 Look = dict[str, Any]
-BEYOND = 3.0
-"""Levels beyond this multiple of the reference solution leave the frame."""
-CUT = 3.0
-"""Solutions beyond this multiple of the exact one are cut off, and the panel says so."""
+BEYOND = 3.0  # levels beyond this multiple of the reference solution leave the frame
+CUT = 3.0  # solutions beyond this multiple of the exact one are cut off, and the panel says so
 TINY = 1e-18
 """Smallest relative size on a logarithmic panel; smaller values are accidents of rounding."""
 BAND = "#56B4E9"

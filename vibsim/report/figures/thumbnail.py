@@ -27,8 +27,7 @@ SHADES = 7  # colours of a map
 FLAT = 1e-2  # smallest relative variation of a number that is drawn as curve or map
 STRAIGHT = 0.99  # share of the variation of a path along one line from which it counts as straight
 WIDE = 1e3  # ratio of largest value to median above which the scale is logarithmic
-BEYOND = 1.5
-"""Solutions beyond this multiple of the smallest of them are cut off."""
+BEYOND = 1.5  # solutions beyond this multiple of the smallest of them are cut off
 NUMBERS = ("amplitude", "period", "growth_per_period")
 """Candidates for a response curve or map: the first that varies; for conservative motions the period comes first."""
 

@@ -21,8 +21,7 @@ from vibsim.report.types import Axes
 
 MOST_CURVES = 6  # in one panel; more cannot be told apart
 ORDERS = 3  # most triples whose order is drawn over time: the finest ones above round-off
-UNSURE = 1.0
-"""An order whose interval is wider, or unbounded, is drawn as uncertain."""
+UNSURE = 1.0  # an order whose interval is wider, or unbounded, is drawn as uncertain
 ROOM, BEYOND = 0.35, 3.0  # least and most distance from the formal order to the edge of the frame
 SPREAD = "the spread: how far each curve is from the finest one above round-off."
 

@@ -15,8 +15,7 @@ from vibsim.report.figures.scenes import Part, Scene
 from vibsim.report.movie.film import Film
 from vibsim.report.types import Axes
 
-Pixels = NDArray[np.uint8]
-"""A frame, shape (height, width, 3)."""
+Pixels = NDArray[np.uint8]  # a frame, shape (height, width, 3)
 WIDTH, HEIGHT, STAGE, NAMES = 8.0, 2.4, 3.0, 0.8
 """Width of a frame; heights of the series over time, and of the drawn systems or the names above it [inch]."""
 INK, DIM, BLUE, RED, GREEN, GOLD = "#16181d", "#69707d", "#1f3a93", "#d1495b", "#0b6e4f", "#a86a12"

@@ -32,14 +32,10 @@ class Run:
     """One member with one scheme on one level."""
 
     title: str
-    t: Floats
-    """Times of the samples, shape (sample,)."""
-    series: Floats
-    """The quantity at the samples; not finite after a breakdown."""
-    states: Mapping[str, Floats]
-    """Every state of the model at the samples."""
-    exact: Floats | None
-    """The exact solution of the quantity at the samples, if known."""
+    t: Floats  # times of the samples, shape (sample,)
+    series: Floats  # the quantity at the samples; not finite after a breakdown
+    states: Mapping[str, Floats]  # every state of the model at the samples
+    exact: Floats | None  # the exact solution of the quantity at the samples, if known
     parameters: Mapping[str, Any]
 
 
@@ -50,21 +46,15 @@ class Film:
     runs: tuple[Run, ...]
     scenes: tuple[Scene, ...]
     """A drawing of each run at the times of the frames; empty if the system cannot be drawn."""
-    t: Floats
-    """Time of every frame, shape (frame,)."""
-    start: float
-    """First time shown."""
-    stop: float
-    """Last time shown."""
+    t: Floats  # time of every frame, shape (frame,)
+    start: float  # first time shown
+    stop: float  # last time shown
     window: float
     """Width of the window over the series: the whole time shown, or some periods of a long run."""
-    label: str
-    """Label of the series, with its unit."""
+    label: str  # label of the series, with its unit
     time_unit: str
-    end: float
-    """Last time requested; the movie may show only the beginning."""
-    name_of_exact: str = "exact"
-    """Name of `Run.exact` in the legend."""
+    end: float  # last time requested; the movie may show only the beginning
+    name_of_exact: str = "exact"  # name of `Run.exact` in the legend
 
     @property
     def is_cut(self) -> bool:

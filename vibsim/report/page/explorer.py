@@ -22,8 +22,7 @@ from vibsim.report.figures.sweeps.view import View
 from vibsim.report.sweep_layout import Key
 from vibsim.report.types import Experiment
 
-POINTS = 2000
-"""Most points of a view that respond to the pointer."""
+POINTS = 2000  # most points of a view that respond to the pointer
 
 
 def worst(record: Results, views: Sequence[View]) -> list[tuple[str, str, str]]:

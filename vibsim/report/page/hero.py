@@ -37,8 +37,7 @@ MEASURED = {
 }  # fmt: skip
 """Kind of a check to the name of its decisive number."""
 
-Number = dict[str, str]
-"""``label``, ``value`` with its unit, and ``note`` of a large number."""
+Number = dict[str, str]  # ``label``, ``value`` with its unit, and ``note`` of a large number
 
 
 def context(summary: Mapping[str, Any], lead: CheckedLadder) -> dict[str, Any]:

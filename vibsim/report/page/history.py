@@ -17,8 +17,7 @@ from typing import Any
 from vibsim import store
 from vibsim.core import regular_files
 
-FILE = ".vibsim/history.js"
-"""Path within the results folder."""
+FILE = ".vibsim/history.js"  # path within the results folder
 _BEFORE, _BEHIND = "vibsimHistory = ", ";\n"
 
 

@@ -46,8 +46,7 @@ class Headline:
     order: str = ""
     interval: str = ""
     error: str = ""
-    text: str = ""
-    """The finding, if no check has an order or an error."""
+    text: str = ""  # the finding, if no check has an order or an error
 
     def __str__(self) -> str:
         """Return the number with which a later run is compared."""
@@ -66,8 +65,7 @@ class Row:
     passed: int = 0
     link: str = ""
     picture: str = ""
-    source: Mapping[str, str | None] | None = None
-    """Its source, by `citation.FIELDS`."""
+    source: Mapping[str, str | None] | None = None  # its source, by `citation.FIELDS`
     checks: Sequence[Mapping[str, Any]] = ()
     broken: int = 0  # number of runs that broke down
     headline: Headline = field(default_factory=Headline)

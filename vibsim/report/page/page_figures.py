@@ -17,8 +17,7 @@ from vibsim.report.style import Picture
 BYTES = 1_000_000  # most bytes of all figures under tabs; further figures are files only
 FIGURES = 6  # most figures under the tabs of a section
 
-Shown = tuple[Picture, str]
-"""A picture with its markup."""
+Shown = tuple[Picture, str]  # a picture with its markup
 Sources = list[tuple[FigureOfSource, list[Picture]]]
 """The figures of the source with their pictures."""
 

@@ -44,10 +44,8 @@ class Lane:
     title: str
     motion: Motion
     scene: Scene
-    period: float
-    """Approximate period of the motion."""
-    end: float
-    """The last time of the run; the player may show only the beginning."""
+    period: float  # approximate period of the motion
+    end: float  # the last time of the run; the player may show only the beginning
 
 
 def element(record: Results) -> str:

@@ -8,8 +8,7 @@ from dataclasses import dataclass
 
 from vibsim.report.page.templates import source
 
-FILE = "sections.json"
-"""A file among the templates, written by ``workflow/catalogue.py``."""
+FILE = "sections.json"  # a file among the templates, written by ``workflow/catalogue.py``
 
 
 @dataclass(frozen=True)
@@ -17,10 +16,8 @@ class Section:
     """A section or an exercise of a text."""
 
     heading: str
-    search: str
-    """The text that a search looks through, in lower case."""
-    see: list[str]
-    """Commands and pages of the documentation."""
+    search: str  # the text that a search looks through, in lower case
+    see: list[str]  # commands and pages of the documentation
     experiments: list[tuple[str, str]]
     """Name without the collection, and link to the page, which is empty if the experiment has not run."""
 

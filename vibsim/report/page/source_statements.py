@@ -10,8 +10,7 @@ from vibsim.core.vocabulary import is_trap
 from vibsim.experiment import citation
 from vibsim.report.tables.source_figures import order
 
-CORRECTION = "correction of the "
-"""Prefix of the source of a claim that corrects a wrong text."""
+CORRECTION = "correction of the "  # prefix of the source of a claim that corrects a wrong text
 CONFIRMED, CORRECTED, OPEN = "CONFIRMED", "CORRECTED", "OPEN"
 
 
@@ -19,16 +18,12 @@ CONFIRMED, CORRECTED, OPEN = "CONFIRMED", "CORRECTED", "OPEN"
 class Statement:
     """A statement of a text and its outcome in a run."""
 
-    place: str
-    """Equation, figure and exercise, if it has a section; else empty."""
-    text: str
-    """The statement and the measurement."""
-    note: str
-    """The truth, if the statement is wrong."""
+    place: str  # equation, figure and exercise, if it has a section; else empty
+    text: str  # the statement and the measurement
+    note: str  # the truth, if the statement is wrong
     badge: str
     experiment: str
-    link: str
-    """The page of the experiment; empty if it has none."""
+    link: str  # the page of the experiment; empty if it has none
 
 
 def listed(

@@ -63,10 +63,8 @@ _ACCENTS = {
 }  # fmt: skip
 _SHIFTS = {"<super>": "^", "<sub>": "_"}
 _ROOT = re.compile("√([A-Za-z0-9]+)")
-_HARMLESS = re.compile("[A-Za-z0-9 .,:;+()/=-]*")
-"""Text that needs no escaping."""
-_OPTION = ("[", "*")
-r"""Beginnings of a row that ``\\`` before it would take as its option."""
+_HARMLESS = re.compile("[A-Za-z0-9 .,:;+()/=-]*")  # text that needs no escaping
+_OPTION = ("[", "*")  # beginnings of a row that ``\\`` before it would take as its option
 
 
 def to_latex(table: Table) -> str:

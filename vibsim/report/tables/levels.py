@@ -18,10 +18,8 @@ from vibsim.report.data import Ladder, Member, Results
 from vibsim.report.tables.table import Cell, Column, Table, Written
 
 OWN, CENTRED = "energy_deviation_max_abs", "energy_deviation_d2t_max_abs"
-ROUND_OFF = 1e-13
-"""Relative errors up to this are rounding, and no quotient of them is shown."""
-Fill = Callable[[Member, int], Cell]
-"""Returns the cell for a member and the position of a level."""
+ROUND_OFF = 1e-13  # relative errors up to this are rounding, and no quotient of them is shown
+Fill = Callable[[Member, int], Cell]  # returns the cell for a member and the position of a level
 
 
 def by_level(

@@ -18,10 +18,8 @@ if TYPE_CHECKING:
     from vibsim.experiment.schema.figures import FigureOfSource
     from vibsim.report.style import Picture
 
-PLAYER = "player"
-"""Kind of figure that the player of the page shows."""
-HEADERS = ("figure", "shows", "place")
-"""The place is the id of an element of the page."""
+PLAYER = "player"  # kind of figure that the player of the page shows
+HEADERS = ("figure", "shows", "place")  # the place is the id of an element of the page
 
 
 def table(drawn: Iterable[tuple[FigureOfSource, Sequence[Picture]]]) -> Table | None:
@@ -34,8 +32,7 @@ def table(drawn: Iterable[tuple[FigureOfSource, Sequence[Picture]]]) -> Table | 
     return Table("figures", "Figures of the source", columns, tuple(rows)) if rows else None
 
 
-FILE = "tables/figures.csv"
-"""Path within the results of an experiment."""
+FILE = "tables/figures.csv"  # path within the results of an experiment
 PAGE = "report.html"
 _NUMBER = re.compile(r"(\d+)")
 
@@ -44,8 +41,7 @@ _NUMBER = re.compile(r"(\d+)")
 class Place:
     """A figure on the page of an experiment."""
 
-    name: str
-    """Name of the experiment."""
+    name: str  # name of the experiment
     shows: str
     link: str
 

@@ -11,8 +11,7 @@ _TOKEN = re.compile(
 )
 _EXPONENT = re.compile(r"\s*[-+]?\s*(?:[A-Za-z]\w*'*|\d+(?:\.\d+)?(?:e-?\d+)?)?")
 _SIGNS = {"-": "−", "*": "·", "->": "→"}
-LONG = 60
-"""A page may break a formula with more characters than this before a sign."""
+LONG = 60  # a page may break a formula with more characters than this before a sign
 
 
 def mathml(text: str) -> str:

@@ -24,8 +24,7 @@ ORDINALS = {1: "first", 2: "second", 3: "third", 4: "fourth", 5: "fifth", 6: "si
 NUMERALS = dict(enumerate(("three", "four", "five", "six", "seven", "eight", "nine"), 3))
 WITH_AN_ORDER = ("asymptotic", "order_low", "order_high")
 """Reasons of results with a settled order; any other order is an estimate that may be an accident."""
-NEAR = 0.15
-"""An order within this distance of an integer is called by its ordinal."""
+NEAR = 0.15  # an order within this distance of an integer is called by its ordinal
 
 ON_ORDER = {
     "asymptotic": "{What} {converges} {at}{everywhere}",

@@ -9,8 +9,7 @@ from vibsim.models.structure import HISTORY, LOAD, Loaded
 from vibsim.report import words
 from vibsim.report.types import ArraySpec, StructureSpec
 
-MOST_SHOWN = 6
-"""Most natural frequencies and damping ratios that are listed."""
+MOST_SHOWN = 6  # most natural frequencies and damping ratios that are listed
 WORDS = {"mass": "M", "stiffness": "K", "damping": "C"}
 
 

@@ -39,8 +39,7 @@ class Map:
     name: str
     quantity: str
     values: Floats  # shape (case,); NaN if a member has no such number
-    label: str = ""
-    """Meaning of the colours, with the unit."""
+    label: str = ""  # meaning of the colours, with the unit
     unit: str = ""
     caption: str = ""
     kind: str = "size"

@@ -23,8 +23,7 @@ from vibsim.report.sweep_layout import Key, bins
 from vibsim.report.types import Axes
 from vibsim.report.words import power
 
-Masks = dict[str, Flags]
-"""Status to the members that have it, shape (case,)."""
+Masks = dict[str, Flags]  # status to the members that have it, shape (case,)
 MOST_PANELS = 6  # most keys with a panel; the table of members has all
 MOST_POINTS = 4000  # most members that are drawn as points
 ORDER_FRAME = 1.5  # distance from the formal order at the edges of the frame

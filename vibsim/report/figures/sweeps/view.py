@@ -20,20 +20,16 @@ from vibsim.report.types import Axes, ValueCheck
 
 SHOWN_ALREADY = ("period", "period_error", "exact_period", "amplitude")
 """Values of checks whose views exist anyway."""
-Worst = Callable[[str], Member]
-"""Returns the worst member, judged by its verdict on a quantity."""
+Worst = Callable[[str], Member]  # returns the worst member, judged by its verdict on a quantity
 
 
 @dataclass(frozen=True)
 class View:
     """A number of all members: a map, curves, or panels for each swept key."""
 
-    name: str
-    """Name by which a reader chooses it."""
-    picture: Picture
-    """Panels with the group id `vibsim.report.style.MEMBER` respond to the pointer."""
-    quantity: str = ""
-    """The quantity of the verdicts that are shown with a member."""
+    name: str  # name by which a reader chooses it
+    picture: Picture  # panels with the group id `vibsim.report.style.MEMBER` respond to the pointer
+    quantity: str = ""  # the quantity of the verdicts that are shown with a member
     values: Floats | None = (
         None  # of `schemes`, shape (scheme, case); None for a verdict, which is shown anyway
     )
@@ -41,12 +37,10 @@ class View:
     """Vertical positions of the members, of the same shape, if they differ from the values."""
     unit: str = ""
     schemes: tuple[int, ...] = ()  # those drawn
-    of: str = ""
-    """The scheme, if each has its own view."""
+    of: str = ""  # the scheme, if each has its own view
     panels: tuple[tuple[int, int | None], ...] = ((0, None),)
     """Positions of the keys along x and y of every panel; None stands for the value."""
-    worst: int | None = None
-    """Position of the marked member."""
+    worst: int | None = None  # position of the marked member
 
 
 def value_checks(record: Results) -> list[tuple[str, str, ValueCheck]]:
