@@ -57,7 +57,6 @@ def parsed(arguments: Sequence[str]) -> argparse.Namespace:
 
 
 def _perform(module: str, name: str, options: argparse.Namespace) -> int:
-    """Import the module of a command and call its function."""
     status: int = getattr(import_module(module), name)(options)
     return status
 
@@ -205,7 +204,6 @@ def commands() -> Iterator[Command]:
 
 
 def _run() -> Iterator[_Row]:
-    """Yield the options of ``vibsim run``."""
     yield RESULTS
     yield _row("experiments", _word, "EXPERIMENT", _NAMES, nargs="*")
     yield from (SETTINGS, CORES)
@@ -222,7 +220,6 @@ def _run() -> Iterator[_Row]:
 
 
 def _verify() -> Iterator[_Row]:
-    """Yield the options of ``vibsim verify``."""
     yield RESULTS
     text = "experiment, collection or FILE.yaml (default: compare the files of all, recompute none)"
     yield _row("experiments", _word, "EXPERIMENT", text, nargs="*")
@@ -232,7 +229,6 @@ def _verify() -> Iterator[_Row]:
 
 
 def _simulate() -> Iterator[_Row]:
-    """Yield the options of ``vibsim simulate``."""
     text = "one level, or several, written to the paths in the plan"
     yield _row("--level", _index, "L", text, nargs="+", required=True)
     yield _row(
@@ -243,7 +239,6 @@ def _simulate() -> Iterator[_Row]:
 
 
 def _report() -> Iterator[_Row]:
-    """Yield the options of ``vibsim report``."""
     yield _row("experiment", _word, "EXPERIMENT", "experiment or FILE.yaml", nargs="?")
     yield FOLDER
     text = "formats of the figure files: svg, png, pdf; several with commas (default: svg)"
@@ -263,14 +258,12 @@ def _detail() -> Iterator[_Row]:
 
 
 def _new() -> Iterator[_Row]:
-    """Yield the options of ``vibsim new``."""
     yield _row("file", _path, "FILE", "new experiment file; an existing one is kept")
     yield _row("--model", _word, "KIND", "kind of the model (default: pendulum)")
     yield _row("--like", _word, "EXPERIMENT", "begin with the text of a shipped experiment")
 
 
 def _theory() -> Iterator[_Row]:
-    """Yield the options of ``vibsim theory``."""
     yield _row("scheme", _word, "SCHEME", "scheme, such as rk4")
     text = "option of the scheme, such as beta=1/6"
     yield _row("options", _word, "NAME=VALUE", text, nargs="*")
@@ -278,7 +271,6 @@ def _theory() -> Iterator[_Row]:
 
 
 def _show() -> Iterator[_Row]:
-    """Yield the options of ``vibsim show``."""
     text = "experiment, one member of its sweep (NAME@CASE), FILE.yaml, or a level file (FILE.nc)"
     yield _row("what", _word, "EXPERIMENT", text)
     yield _row("--quantity", _word, "NAME", "what to draw (default: the first position)")
@@ -295,7 +287,6 @@ def _show() -> Iterator[_Row]:
 
 
 def _movie() -> Iterator[_Row]:
-    """Yield the options of ``vibsim movie``."""
     text = "experiment, one member of its sweep (NAME@CASE), or FILE.yaml"
     yield _row("experiment", _word, "EXPERIMENT", text)
     text = "movie to write: .mp4, .webm or .gif (default: the name of the experiment, .mp4)"
@@ -318,7 +309,6 @@ def _movie() -> Iterator[_Row]:
 
 
 def _judge() -> Iterator[_Row]:
-    """Yield the options of ``vibsim judge``."""
     text = "a table (CSV or TSV) with a row for each level, or a netCDF file for each level"
     yield _row("files", _path, "FILE", text, nargs="+")
     text = "step size: a column of the table; an attribute or variable of each netCDF file, or h1,h2,... in their order"

@@ -76,7 +76,6 @@ def _without(row: Mapping[str, Any], name: str) -> dict[str, Any]:
 
 
 def _columns(axes: Sequence[Any]) -> dict[str, Any]:
-    """Return the values of a sweep by key."""
     columns: dict[str, Any] = {}
     for axis in axes:
         match axis:

@@ -126,7 +126,6 @@ def _judged(study: Study, options: Namespace, exact: Decimal | None) -> LadderVe
 
 
 def _text(verdicts: Sequence[LadderVerdict]) -> list[str]:
-    """Return the lines for a terminal."""
     from vibsim.convergence.study.terminal import COLUMNS, as_text
 
     columns = shutil.get_terminal_size().columns if sys.stdout.isatty() else COLUMNS

@@ -67,7 +67,6 @@ def _verdicts(plan: Plan, results: Path, summary: Mapping[str, Any] | None) -> I
 
 
 def _draw(record: Record, options: Namespace, title: str) -> None:
-    """Print the plot of one quantity of one scheme."""
     from vibsim.cli.line_plot import draw, legend
 
     names = level_member.series(record)

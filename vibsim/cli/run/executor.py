@@ -104,7 +104,6 @@ def _numbers(folder: Path, option: str) -> dict[str, int]:
 
 
 def _read(folder: Path) -> dict[str, Any]:
-    """Return the profile in a folder."""
     import yaml
 
     try:

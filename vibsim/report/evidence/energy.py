@@ -89,7 +89,6 @@ def picture(checked: CheckedLadder, check: ConservesCheck) -> Picture | None:
 
 
 def _draw(ax: Axes, error: EnergyError) -> None:
-    """Draw windows, error, means and the expected drift."""
     t, end = error.t, float(error.t[-1])
     has_bars = error.kind != "none" and not error.is_broken
     ax.set_xlim(float(t[0]), end)
@@ -166,7 +165,6 @@ def _naming(error: EnergyError) -> str:
 
 
 def _dashed_line(error: EnergyError) -> str:
-    """Explain the dashed line."""
     if error.is_broken:
         return ""
     if error.has_border:

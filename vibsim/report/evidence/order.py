@@ -42,7 +42,6 @@ def picture(checked: CheckedLadder, check: ConvergesCheck) -> Picture | None:
 
 
 def _draw_differences(figure: Figure, ladder: Ladder) -> None:
-    """Draw the rescaled differences over time."""
     t, curves = ladder.t, curves_of_differences(ladder)
     shown = [curve for curve in curves if curve.is_readable] or curves
     title = style.label(f"rescaled differences of {ladder.letter}", ladder.unit("rescaled"))

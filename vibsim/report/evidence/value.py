@@ -78,7 +78,6 @@ def _beside_border(row: ByLevel, check: ValueCheck, title: str, bar: Floats) -> 
 
 
 def _number_title(check: ValueCheck) -> str:
-    """Return the name of a number for a title."""
     text = what(check, words.PAGE)
     if check.number.is_sample or (check.at.t is None and check.at.step is None):
         return text

@@ -167,7 +167,6 @@ def _step_limits(ax: Axes, dt: Floats, errors: list[Floats], floors: list[Floats
 
 
 def _level_axis(ax: Axes, dt: Floats, levels: list[int]) -> None:
-    """Write the levels along the top of a panel."""
     above: dict[str, Any] = {"va": "bottom", "fontsize": 8.5}
     stride = max(1, len(levels) // 8)
     for x, level in zip(dt[::stride].tolist(), levels[::stride], strict=True):

@@ -421,7 +421,6 @@ class Writer(RendererBase):  # type: ignore[misc, unused-ignore]
     # elements
 
     def _data(self, path: Any, transform: Any, is_line: bool) -> str:
-        """Return the SVG path data of a path."""
         simplify = bool(path.should_simplify and is_line)
         clip = (0.0, -self._size[1], *self._size) if is_line else None  # a legend may stand above
         raw = cast(Any, _path).convert_to_string(

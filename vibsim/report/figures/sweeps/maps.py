@@ -242,7 +242,6 @@ def _cells(ax: Axes, grid: Grid, shown: Map, table: Floats) -> Any:
 
 
 def _colours(shown: Map, table: Floats) -> tuple[Any, Any]:
-    """Return the colour map of a map and its normalisation."""
     from matplotlib import colormaps
     from matplotlib.colors import BoundaryNorm, ListedColormap, LogNorm, Normalize
 
@@ -319,7 +318,6 @@ def _legend(ax: Axes, shown: Map) -> None:
 
 
 def _scale(ax: Axes, image: Any, shown: Map, table: Floats) -> None:
-    """Draw the colour bar beside a map."""
     from matplotlib.ticker import MaxNLocator
 
     values = style.finite(table)

@@ -31,7 +31,6 @@ MESH = 160, 60  # cells in which members are counted, across and up
 
 
 def _legend(ax: Axes, verdicts: list[str]) -> None:
-    """Draw the legend of the colours of verdicts above the axes."""
     from matplotlib.patches import Patch
 
     handles = [Patch(color=style.STATUS_COLOURS[word], label=word) for word in verdicts]
