@@ -7,12 +7,10 @@ from pathlib import Path
 
 from vibsim.core.home import home
 
-ADHOC = "adhoc"
-"""Collection of a file outside the shipped ``configs/``."""
+ADHOC = "adhoc"  # collection of a file outside the shipped ``configs/``
 SITE = "docs"
 """Folder among the collections of the results, with the documentation built by ``make docs``."""
-ENDINGS = (".yaml", ".yml")
-"""Endings of the names of experiment files."""
+ENDINGS = (".yaml", ".yml")  # endings of the names of experiment files
 
 
 def collection_of(file: Path, configs: Path | None = None) -> str:

@@ -10,8 +10,7 @@ from vibsim.models import MODELS, Model
 from vibsim.models.shared.coordinates import MOST, coordinate_faults
 from vibsim.schemes import SCHEMES, Scheme
 
-COORDINATES = "coordinates"
-"""Key under which a file names the coordinates of its equations."""
+COORDINATES = "coordinates"  # key under which a file names the coordinates of its equations
 
 
 @dataclass(frozen=True)

@@ -17,8 +17,7 @@ from typing import Any
 from vibsim.core.errors import nearest
 from vibsim.experiment.schema.unit_text import UnitError, factors
 
-MAX_POWER = 99
-"""Largest exponent of a base unit."""
+MAX_POWER = 99  # largest exponent of a base unit
 DEFINITIONS = """\
 tera- = 1e12 = T-
 giga- = 1e9 = G-

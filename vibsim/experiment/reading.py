@@ -42,8 +42,7 @@ from vibsim.models import MODELS, Model
 from vibsim.models.structure import STRUCTURE
 from vibsim.schemes import SCHEMES, Scheme
 
-SOLVER = "solver"
-"""Key that only the files of `vibsim.experiment.solver_reading` have."""
+SOLVER = "solver"  # key that only the files of `vibsim.experiment.solver_reading` have
 KEYS = (*Document.model_fields, SOLVER, "refine", "quantities")
 """Top-level keys of both kinds of experiment file."""
 MAX_NAME = 100

@@ -19,8 +19,7 @@ from vibsim.experiment.faults import Report
 from vibsim.experiment.yaml.parse import Path_
 
 REPEAT = "repeat"
-MOST_VALUES = 1000
-"""Largest number of combinations of index values."""
+MOST_VALUES = 1000  # largest number of combinations of index values
 _INDEX = re.compile(r"\{\s*([A-Za-z]\w*)\s*(?:([+-])\s*(\d{1,4}))?\s*\}")
 _BRACE = re.compile(r"[{}]")
 

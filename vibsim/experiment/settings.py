@@ -18,8 +18,7 @@ from vibsim.experiment.yaml.parse import Node, Path_, Source, dotted, parse
 FORM = "must be KEY=VALUE, e.g. model.g=1.62 or schemes[0].kind=rk4"
 _VALUE = "value"
 _INDEX = re.compile(r"\[(\d{1,9})\]\.?")
-_DOTTED_SECTIONS = (("sweep",), ("at",))
-"""Sections whose keys are dotted keys of swept parameters."""
+_DOTTED_SECTIONS = (("sweep",), ("at",))  # sections whose keys are dotted keys of swept parameters
 
 
 def with_settings(source: Source, settings: Sequence[str]) -> Source:

@@ -26,8 +26,7 @@ from vibsim.experiment.schema.solver import (
     SolverCheck,
 )
 
-Argument = int | float | str
-"""A size or a parameter; an int if the file has a whole number."""
+Argument = int | float | str  # a size or a parameter; an int if the file has a whole number
 OUTPUTS = (PLACE, f"{PLACE}.nc", f"{PLACE}.csv")
 """Placeholders of the file that a command writes; the first two are equivalent."""
 

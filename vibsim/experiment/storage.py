@@ -15,12 +15,9 @@ FEWEST_INTERVALS = 16
 """Smallest number of sampling intervals to which ``samples: auto`` thins a member."""
 LEAN = 2**18
 """Largest number of samples of one variable on the coarsest level of an experiment that is not lean."""
-MOST_EXTREMA = 512
-"""Largest number of peaks, and of troughs, stored per scheme and member."""
-FEWEST_EXTREMA = 16
-"""Number of extrema stored per scheme and member however many members there are."""
-MOST_REFERENCES = 1024
-"""Largest number of members for which reference solutions are computed."""
+MOST_EXTREMA = 512  # largest number of peaks, and of troughs, stored per scheme and member
+FEWEST_EXTREMA = 16  # number of extrema stored per scheme and member however many members there are
+MOST_REFERENCES = 1024  # largest number of members for which reference solutions are computed
 RUNNING = "_running_max"
 """Suffix of the series with the running maximum of the absolute energy deviation, over all steps so far."""
 _PEAK_VALUE = "phase_error_slope"

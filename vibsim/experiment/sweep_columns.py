@@ -24,16 +24,12 @@ if TYPE_CHECKING:
     from vibsim.experiment.data import ExperimentSpec
     from vibsim.schemes import Options, Scheme
 
-Column = NDArray[Any]
-"""Values of one key, float64 or text."""
-Columns = Mapping[str, Column]
-"""Values of all members by dotted key, each of shape (case,)."""
+Column = NDArray[Any]  # values of one key, float64 or text
+Columns = Mapping[str, Column]  # values of all members by dotted key, each of shape (case,)
 SAME, EPS = 1e-9, 1e-14
 """Tolerances for finding a swept value: relative to the value, and relative to the largest value of the sweep."""
-_PER_COUNT = 4
-"""Number of outputs of Philox per counter value."""
-_DIGITS = 60
-"""Precision of intermediate decimals, enough to round any power to the nearest double."""
+_PER_COUNT = 4  # number of outputs of Philox per counter value
+_DIGITS = 60  # precision of intermediate decimals, enough to round any power to the nearest double
 
 
 def columns(experiment: ExperimentSpec, start: int, stop: int) -> dict[str, Column]:

@@ -23,16 +23,11 @@ from vibsim.experiment.yaml.parse import Path_
 from vibsim.formula import CONSTANTS, FUNCTIONS, ExpressionError, constant
 from vibsim.models import Model
 
-MAX_OWN = 50
-"""Largest number of units defined in one file."""
-_ANY = ""
-"""Marks a key that accepts any unit; the value is converted to SI base units."""
-FILE_ENDINGS = (*matrix.ENDINGS, *file.ENDINGS)
-"""Endings of the files that a structure may name."""
-_UNKNOWN = "?"
-"""Marks a key that does not exist, which is reported elsewhere."""
-_STAND_IN = 1.0
-"""Temporary placeholder for a refused value; valid everywhere."""
+MAX_OWN = 50  # largest number of units defined in one file
+_ANY = ""  # marks a key that accepts any unit; the value is converted to SI base units
+FILE_ENDINGS = (*matrix.ENDINGS, *file.ENDINGS)  # endings of the files that a structure may name
+_UNKNOWN = "?"  # marks a key that does not exist, which is reported elsewhere
+_STAND_IN = 1.0  # temporary placeholder for a refused value; valid everywhere
 
 
 class Units:

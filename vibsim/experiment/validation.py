@@ -19,8 +19,7 @@ from vibsim.experiment.schema.fields import STAND_IN, Section
 from vibsim.experiment.units import Units
 from vibsim.experiment.yaml.parse import Path_
 
-_FAULTY: Any = object()
-"""Marks a value that is left out."""
+_FAULTY: Any = object()  # marks a value that is left out
 
 
 def read_document(report: Report, kind: type[Section] = Document) -> Any:

@@ -21,14 +21,11 @@ IN_WORDS: Mapping[str, str] = {
     "monotone": "direction of the",
 }
 """First words of the name of a reduced number; `where` has become `where_largest` before it is named."""
-OF_ONE_MEMBER = (None, "largest", "smallest")
-"""Reductions that pick the number of one member."""
+OF_ONE_MEMBER = (None, "largest", "smallest")  # reductions that pick the number of one member
 OF_THE_SAME_KIND = (*OF_ONE_MEMBER, "mean")
 """Reductions with the unit of a member's number. The others give swept values or directions."""
-CASES = "cases"
-"""What a number is taken over that needs no swept key: all members."""
-MOST_EVENTS = 512
-"""Largest number of event times stored per scheme and member."""
+CASES = "cases"  # what a number is taken over that needs no swept key: all members
+MOST_EVENTS = 512  # largest number of event times stored per scheme and member
 
 
 @dataclass(frozen=True)
@@ -50,27 +47,21 @@ class Value:
     measure: Literal["none", "count", "quantity", "l1", "l2", "time", "frequency", "position"]
     """Its unit: none; a count; the unit of the quantity, times that of time (``l1``) or its square root (``l2``);
     the unit of time, of angle over time, or of the position."""
-    at: tuple[AtPart, ...] = ("level", "scheme", "case")
-    """The keys of ``at:`` that it accepts."""
-    finer_levels: int = 0
-    """Number of finer levels that it needs besides its own level."""
+    at: tuple[AtPart, ...] = ("level", "scheme", "case")  # the keys of ``at:`` that it accepts
+    finer_levels: int = 0  # number of finer levels that it needs besides its own level
     best: bool = False
     """Whether it is defined at ``level: best``, as the limit of the numbers of all levels or for the extrapolated
     solution."""
-    needs_time: bool = False
-    """Whether ``t`` or ``step`` must be given."""
+    needs_time: bool = False  # whether ``t`` or ``step`` must be given
     needs_exact: Literal["solution", "period"] | None = None
     """Exact result that the model must provide."""
-    needs_linear: bool = False
-    """Whether it follows from theory for undamped linear models."""
-    fixed_step: bool = False
-    """Whether it is undefined for adaptive schemes."""
+    needs_linear: bool = False  # whether it follows from theory for undamped linear models
+    fixed_step: bool = False  # whether it is undefined for adaptive schemes
     needs_potential: bool = False
     """Whether it requires a known potential energy of all forces of the position."""
     needs_rational: bool = False
     """Whether the acceleration must be computable in rational arithmetic (`vibsim.theory.degrees`)."""
-    needs_events: bool = False
-    """Whether it exists only for models with events."""
+    needs_events: bool = False  # whether it exists only for models with events
     needs_force: bool = False
     """Whether it refers to whole periods of a force, whose frequency ``time:`` names."""
     is_sample: bool = False
@@ -82,10 +73,8 @@ class Value:
     measured_by: Literal["", "parabola", "points", "roots"] = ""
     """Its source of error besides the time steps: a peak interpolated by a parabola, extrema over grid points, or the
     recurrence of the steps, whose round-off is eps/(w dt)^2 (peaks if the scheme has no such recurrence)."""
-    is_angle: bool = False
-    """Whether it is defined modulo whole turns."""
-    has_own_size: bool = False
-    """Whether its round-off is relative to itself."""
+    is_angle: bool = False  # whether it is defined modulo whole turns
+    has_own_size: bool = False  # whether its round-off is relative to itself
     rests_on_run: bool = False
     """Whether a longer run makes its limit more accurate: transients and other spectral lines disturb it less."""
 

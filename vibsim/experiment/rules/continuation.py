@@ -21,10 +21,8 @@ from vibsim.models.shared.free import why_not_free
 
 MOMENTS = np.linspace(0.0, 1.0, 16, endpoint=False)
 """Times at which the equation is compared with itself one end time later, as fractions of the end."""
-STATES = np.cos(np.arange(1.0, 17.0))
-"""Positions and velocities at these times; arbitrary."""
-SAME_FORCE = 1e-6
-"""Tolerance of the accelerations there, relative to the largest one."""
+STATES = np.cos(np.arange(1.0, 17.0))  # positions and velocities at these times; arbitrary
+SAME_FORCE = 1e-6  # tolerance of the accelerations there, relative to the largest one
 KEY = ("sweep", "follow")
 
 

@@ -39,10 +39,8 @@ from vibsim.models.shared.coordinates import name_fault
 from vibsim.models.structure import RAYLEIGH
 
 NAME = re.compile(r"[A-Za-z][A-Za-z0-9_]*")
-NONE = "none"
-"""Word for an absent term, for fields that take words."""
-MOST_NAMED = 8
-"""Largest number of names listed in a message."""
+NONE = "none"  # word for an absent term, for fields that take words
+MOST_NAMED = 8  # largest number of names listed in a message
 
 
 def shortlist(names: Sequence[str]) -> str:
@@ -57,8 +55,7 @@ class FormulaReader:
     section: Any
     model: Model
     report: Report
-    texts: dict[str, str] = field(default_factory=dict)
-    """Formulas by key."""
+    texts: dict[str, str] = field(default_factory=dict)  # formulas by key
     coefficients: dict[str, float] = field(default_factory=dict)
     """Coefficients of terms given by a word, by key."""
     tables: dict[str, TableSpec] = field(default_factory=dict)

@@ -37,12 +37,10 @@ from vibsim.models.shared.crossings import STOP
 from vibsim.models.shared.inertia import MASS, inertia
 from vibsim.models.table import Lookup
 
-CHUNK = 2**16
-"""Members per block."""
+CHUNK = 2**16  # members per block
 SLACK = 1e-6
 """Tolerance for rounding when abscissae are compared, in spacings of the table or in steps."""
-MOST_NAMED = 3
-"""Largest number of swept values that identify a member in a message."""
+MOST_NAMED = 3  # largest number of swept values that identify a member in a message
 SAMPLED_MEMBERS = 64
 """Number of members, evenly spaced, that are checked for jumps: hardly ever do only a few members jump."""
 WORK = 2**10

@@ -34,13 +34,11 @@ MAX_NODES = 20_000
 class Equation:
     """The valid content of a section ``model``."""
 
-    model: Model | None
-    """The equation of motion; None if the kind or a formula is faulty."""
+    model: Model | None  # the equation of motion; None if the kind or a formula is faulty
     parameters: dict[str, float] = field(default_factory=dict)
     formulas: dict[str, str] = field(default_factory=dict)
     tables: dict[str, TableSpec] = field(default_factory=dict)
-    terms: tuple[str, ...] = ()
-    """The optional terms (`Model.optional`) that the equation contains."""
+    terms: tuple[str, ...] = ()  # the optional terms (`Model.optional`) that the equation contains
     structure: StructureSpec | None = None
 
     @property

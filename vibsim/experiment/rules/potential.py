@@ -13,10 +13,8 @@ from vibsim.models import Model, tree
 from vibsim.models.base import by_name
 from vibsim.models.shared.identities import AGREE, TESTS
 
-AMPLITUDES = (-6, 8)
-"""Range of the exponents of 2 of the amplitudes at which both are compared."""
-PANELS, POINTS = 32, 16
-"""Number of quadrature panels per amplitude, and of points per panel."""
+AMPLITUDES = (-6, 8)  # range of the exponents of 2 of the amplitudes at which both are compared
+PANELS, POINTS = 32, 16  # number of quadrature panels per amplitude, and of points per panel
 NOT_FOUND = "no potential energy was found of the forces that the positions make"
 
 

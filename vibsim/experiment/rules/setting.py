@@ -17,15 +17,11 @@ class Setting:
     model: Model | None
     time: TimeSpec | None
     levels: tuple[int, ...]
-    schemes: tuple[SchemeSpec, ...]
-    """The schemes without a fault."""
-    names: tuple[str, ...]
-    """The names of the schemes in the file, valid or not."""
-    sweep: Sweep
-    """The sweep, with only its valid axes."""
+    schemes: tuple[SchemeSpec, ...]  # the schemes without a fault
+    names: tuple[str, ...]  # the names of the schemes in the file, valid or not
+    sweep: Sweep  # the sweep, with only its valid axes
     samples: int | str
-    knows_sweep: bool = True
-    """Whether all axes of the sweep are valid."""
+    knows_sweep: bool = True  # whether all axes of the sweep are valid
     by_tolerance: bool = False
     """Whether a tolerance will choose the levels, so that checks cannot name them."""
     knows_schemes: bool = True

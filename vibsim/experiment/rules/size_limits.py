@@ -8,12 +8,10 @@ from vibsim.experiment.faults import Report
 from vibsim.experiment.rules.setting import Setting
 
 MAX_MEMBERS = 10**7
-MAX_MEMBER_STEPS = 2**40
-"""Total steps of all schemes, members and levels: about a day of one core."""
+MAX_MEMBER_STEPS = 2**40  # total steps of all schemes, members and levels: about a day of one core
 MAX_MEMORY = 8 * 2**30
 """Memory of a job [bytes], which holds at least all samples of one member and all schemes at one level."""
-MAX_DISK = 2**40
-"""Bytes of the files of all levels."""
+MAX_DISK = 2**40  # bytes of the files of all levels
 MAX_FILES = 10_000
 """Files of all levels. With more of them the overhead of the workflow dominates."""
 MIN_DT = 1e-100

@@ -17,11 +17,9 @@ from vibsim.experiment.yaml.parse import Path_
 from vibsim.models.shared.coordinates import name_fault, velocities_of
 from vibsim.models.structure import HISTORY, LOAD, MOST_OBSERVED, RAYLEIGH
 
-ROUNDED_END = 1e-9
-"""Relative tolerance of the end of a load table, which the file may have rounded."""
+ROUNDED_END = 1e-9  # relative tolerance of the end of a load table, which the file may have rounded
 _DOF = "must be the number of a degree of freedom, counted from 1, its name such as u2, or one that `observe` gives it"
-Formulas = dict[str, tuple[str, Path_]]
-"""Formulas by key: text, and path in the file."""
+Formulas = dict[str, tuple[str, Path_]]  # formulas by key: text, and path in the file
 
 
 def read_structure(

@@ -32,8 +32,7 @@ from vibsim.models import Model
 
 MAX_HYPERCUBE = 10**6
 """Largest number of points of a Latin hypercube, which must be drawn as a whole."""
-MAX_RANGE = 2.0**53
-"""Largest number of values of a range: larger indices are not exact as floats."""
+MAX_RANGE = 2.0**53  # largest number of values of a range: larger indices are not exact as floats
 _STEPS = "step counts cannot be swept: every member has the same steps"
 _FIXED = {
     f"time.{name}": _STEPS
@@ -100,8 +99,7 @@ class SweepReader:
     time: Any = None
     model: Model | None = None
     lacks_scheme: bool = False
-    first: dict[str, Path_] = field(default_factory=dict)
-    """Path at which each key is swept first."""
+    first: dict[str, Path_] = field(default_factory=dict)  # path at which each key is swept first
 
     def axes(self, section: Any) -> list[Axis | None]:
         """Return the axes of a section, in the order of the file."""

@@ -16,8 +16,7 @@ from vibsim.models import Model, natural_end, table_end
 
 ANGULAR = ("rad s-1", "1")
 """Units of an angular frequency; 1 for parameters that the user declares and for dimensionless models."""
-WHOLE_NUMBER = 1e-12
-"""Relative tolerance within which a number counts as a whole number."""
+WHOLE_NUMBER = 1e-12  # relative tolerance within which a number counts as a whole number
 
 
 def time_spec(

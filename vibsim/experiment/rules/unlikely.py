@@ -37,10 +37,8 @@ from vibsim.models import Model, tree
 from vibsim.models.shared.coordinates import angles
 
 TURN = 2.0 * math.pi
-MEMBERS = 9
-"""Number of members of a sweep whose laws are looked at."""
-EXACT_DIGITS = 9
-"""From this number of digits on, a number is meant to be compared to 1e-9 relative."""
+MEMBERS = 9  # number of members of a sweep whose laws are looked at
+EXACT_DIGITS = 9  # from this number of digits on, a number is meant to be compared to 1e-9 relative
 
 
 def note_unlikely(

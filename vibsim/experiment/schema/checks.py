@@ -105,8 +105,7 @@ _At = Annotated[
 ]
 
 
-OF_A_QUANTITY = ("converges", "accurate")
-"""Kinds of checks whose leading key holds the quantity."""
+OF_A_QUANTITY = ("converges", "accurate")  # kinds of checks whose leading key holds the quantity
 
 
 class MeasuringCheck(Section):
@@ -359,8 +358,7 @@ class AccurateCheck(Accuracy):
 
 DEFAULT_RTOL, DEFAULT_ATOL = 1e-9, 1e-12
 """Default tolerances of ``equals``; the absolute one only for numbers without a unit, and for 0."""
-PLAIN = ("none", "count")
-"""Measures (`Value.measure`) of numbers without a unit."""
+PLAIN = ("none", "count")  # measures (`Value.measure`) of numbers without a unit
 
 
 class ValueCheck(MeasuringCheck):

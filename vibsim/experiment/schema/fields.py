@@ -36,16 +36,12 @@ _COMMA = re.compile(r"[-+]?\d+,\d+")
 MAX_LEVEL = 40
 STAND_IN = "?"
 """Placeholder for faulty text that cannot be left out; no further fault is reported for it."""
-MAX_FORMULAS = 1000
-"""Largest number of formulas in one list."""
-MAX_ENTRIES = 1000
-"""Largest number of schemes or checks of one experiment."""
+MAX_FORMULAS = 1000  # largest number of formulas in one list
+MAX_ENTRIES = 1000  # largest number of schemes or checks of one experiment
 DECLARED = "parameters"
 """Key of the section ``model`` under which a file declares parameters for its formulas."""
-TABLE = "table"
-"""Key of the path of a table."""
-AT = "at"
-"""Key of the abscissa, as a function of time, at which a table is evaluated."""
+TABLE = "table"  # key of the path of a table
+AT = "at"  # key of the abscissa, as a function of time, at which a table is evaluated
 FORMULA_NOTE = "a number, or a constant formula such as 2*pi/30"
 
 
@@ -245,8 +241,7 @@ GivenId = Annotated[Identifier, Field(json_schema_extra=_no_default)]
 """The id of a check; empty if the file gives none."""
 Text = Annotated[str, Field(min_length=1), AfterValidator(_printable)]
 """Text that may have several lines."""
-Line = Annotated[Text, AfterValidator(_one_line)]
-"""Text on one line."""
+Line = Annotated[Text, AfterValidator(_one_line)]  # text on one line
 FormulaText = Annotated[
     str,
     StringConstraints(min_length=1),

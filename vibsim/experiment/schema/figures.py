@@ -17,8 +17,7 @@ Shows = Literal[
 KINDS: tuple[str, ...] = get_args(Shows)
 OVER_TIME = ("quantities", "panels", "each", "until", "beside")
 """Keys that only `over_time` accepts."""
-LEVEL, MEMBER = "level", "member"
-"""Values of `panels` and `each` besides swept keys."""
+LEVEL, MEMBER = "level", "member"  # values of `panels` and `each` besides swept keys
 
 
 class FigureOfSource(Section):

@@ -41,8 +41,7 @@ from vibsim.models.shared.crossings import MOST_EVENTS, STOP
 from vibsim.schemes import AnyOption, Flag, NumberOption, Option, Scheme
 from vibsim.schemes.base import EVENTS
 
-TOLERANCE = "tolerance"
-"""The option of adaptive schemes that may have several values."""
+TOLERANCE = "tolerance"  # the option of adaptive schemes that may have several values
 MAX_TOLERANCES = 100
 
 

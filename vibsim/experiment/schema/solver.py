@@ -30,10 +30,8 @@ from vibsim.experiment.schema.fields import (
 from vibsim.experiment.schema.sweep import ParameterSweep
 
 Kind = Literal["command", "python", "files"]
-KINDS: tuple[Kind, ...] = get_args(Kind)
-"""Kinds of solvers, each a key of the section ``solver``."""
-PLACE = "output"
-"""Placeholder of the file that a command writes."""
+KINDS: tuple[Kind, ...] = get_args(Kind)  # kinds of solvers, each a key of the section ``solver``
+PLACE = "output"  # placeholder of the file that a command writes
 RESERVED = (PLACE, "level", "levels", "threads", "case")
 """Names that no size, parameter or quantity may have."""
 MOST_LEVELS = 100

@@ -45,8 +45,7 @@ def tolerance_name(name: str, tolerance: float) -> str:
     return f"{name}_{next((text for text in texts if float(text) == tolerance), repr(tolerance))}"
 
 
-HIT = 1e-9
-"""Tolerance within which the last value of a range reaches the end, in steps."""
+HIT = 1e-9  # tolerance within which the last value of a range reaches the end, in steps
 MAX_SEED = 2**63 - 1
 Seed = Annotated[int, Field(ge=0, le=MAX_SEED), BeforeValidator(whole)]
 Method = Literal["latin_hypercube", "sobol", "random"]
@@ -110,8 +109,7 @@ RULES: Mapping[str, type[Section]] = {"linspace": Linspace, "logspace": Logspace
 """All rules by key."""
 Rule = Linspace | Logspace | Range
 Entry = float | str
-Values = tuple[float, ...] | tuple[Text, ...] | Rule
-"""Numbers, option words, or a rule for numbers."""
+Values = tuple[float, ...] | tuple[Text, ...] | Rule  # numbers, option words, or a rule for numbers
 
 
 class _Sampled(Section):

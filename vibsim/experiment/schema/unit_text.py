@@ -14,8 +14,7 @@ from typing import NamedTuple
 from vibsim.core.errors import VibsimError
 from vibsim.formula import CONSTANTS, FUNCTIONS
 
-MAX_UNIT = 200
-"""Largest number of characters of a unit."""
+MAX_UNIT = 200  # largest number of characters of a unit
 MAX_EXPONENT = 9
 
 _LETTERS = "A-Za-z\u00b5\u03bc\u03a9\u2126\u00b0%"

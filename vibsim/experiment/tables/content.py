@@ -8,8 +8,7 @@ from vibsim.core.errors import nearest
 from vibsim.experiment.schema.fields import TABLE
 from vibsim.experiment.yaml.file_content import MOST_BYTES, content_of
 
-MOST_LISTED = 8
-"""Largest number of files listed in a message."""
+MOST_LISTED = 8  # largest number of files listed in a message
 
 
 class TableError(ValueError):

@@ -18,12 +18,9 @@ import numpy as np
 
 from vibsim.core.array_types import Floats, Integers
 
-MOST_LINES = 2**21
-"""Largest number of lines, including empty lines and comments."""
-ROWS_WRITTEN = 1000
-"""Largest number of rows whose cells are kept as text."""
-MOST_CHARACTERS = 2**16
-"""Largest number of characters of a line."""
+MOST_LINES = 2**21  # largest number of lines, including empty lines and comments
+ROWS_WRITTEN = 1000  # largest number of rows whose cells are kept as text
+MOST_CHARACTERS = 2**16  # largest number of characters of a line
 SEPARATORS = {";": "semicolons", "\t": "tabs", ",": "commas"}
 """Separators in the order in which they are tried: with another separator, names may contain a comma."""
 

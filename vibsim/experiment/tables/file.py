@@ -23,13 +23,10 @@ from vibsim.models.table import FEWEST_POINTS, Table
 
 ENDINGS = (".csv", ".nc")
 MOST_POINTS = 2**20
-EVEN = 1e-3
-"""Tolerance for equal spacing of abscissae, in spacings: a file may have rounded them."""
+EVEN = 1e-3  # tolerance for equal spacing of abscissae, in spacings: a file may have rounded them
 UNIT = "m"
-WORDS = {"x": "places", "t": "times"}
-"""Name of the content of the first column, by its key."""
-MOST_SHOWN = 40
-"""Largest number of characters of a name in a message."""
+WORDS = {"x": "places", "t": "times"}  # name of the content of the first column, by its key
+MOST_SHOWN = 40  # largest number of characters of a name in a message
 
 
 _Columns = tuple[Floats, Floats, Callable[[Any], str], tuple[str, str]]

@@ -23,8 +23,7 @@ from vibsim.models.structure import MOST_DOFS
 
 ENDINGS = (".mtx", ".npy", ".csv")
 SPARSE_HEADER = "row,column,value"
-MOST_DENSE = 2048
-"""Largest number of rows of a dense matrix."""
+MOST_DENSE = 2048  # largest number of rows of a dense matrix
 
 
 def read(path: Path) -> tuple[Any, str]:

@@ -21,12 +21,10 @@ from vibsim.models.structure import HISTORY, LOAD, MOST_DOFS, MOST_MODES, MOST_O
 
 MATRICES = ("mass", "stiffness", "damping")
 STARTS = ("start.displacement", "start.velocity")
-SYMMETRIC = 1e-12
-"""Tolerance of symmetry, relative to the largest entry: files are rounded."""
+SYMMETRIC = 1e-12  # tolerance of symmetry, relative to the largest entry: files are rounded
 SAME_FREQUENCY = 1e-9
 """Relative tolerance of multiple frequencies, whose shapes an eigensolver may mix arbitrarily."""
-FLAT = 1e-9
-"""Smallest observed displacement that can scale a mode, relative to its largest entry."""
+FLAT = 1e-9  # smallest observed displacement that can scale a mode, relative to its largest entry
 
 
 @dataclass

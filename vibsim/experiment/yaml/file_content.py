@@ -7,10 +7,8 @@ from pathlib import Path
 from vibsim.core import regular_files
 from vibsim.core.errors import Fault, InputError, likely
 
-MAX_BYTES = 2**20
-"""Largest size of an experiment file [bytes]."""
-MOST_BYTES = 2**26
-"""Largest size of a table [bytes]."""
+MAX_BYTES = 2**20  # largest size of an experiment file [bytes]
+MOST_BYTES = 2**26  # largest size of a table [bytes]
 
 
 def read_bytes(path: Path, most: int = MAX_BYTES) -> bytes:

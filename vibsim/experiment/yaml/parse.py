@@ -23,12 +23,10 @@ from vibsim.experiment.yaml.file_content import read_bytes
 
 MAX_FAULTS = 1000
 MAX_ALIASES = 50
-MAX_NODES = 200_000
-"""Largest number of nodes of a file with all aliases expanded."""
+MAX_NODES = 200_000  # largest number of nodes of a file with all aliases expanded
 MAX_DEPTH = 32
 
-Path_ = tuple[str | int, ...]
-"""Path of a value: keys and list positions from the top."""
+Path_ = tuple[str | int, ...]  # path of a value: keys and list positions from the top
 
 _NOT_PRINTABLE = re.compile("[^\t\n\r\x20-\x7e\x85\xa0-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]")
 """Characters that YAML 1.2.2, section 5.1, does not allow."""
@@ -48,8 +46,7 @@ _NAN = frozenset({".nan", ".NaN", ".NAN"})
 _INVALID = "is not valid YAML"
 _TAB = re.compile(" *\t")
 _TIGHT_COLON = re.compile(r"\s*(- )?\w+:[^\s:/]")
-_INDEX = re.compile(r"\w\{\w+([+-]\d+)?\}")
-"""Matches a name with an index of `repeat`."""
+_INDEX = re.compile(r"\w\{\w+([+-]\d+)?\}")  # matches a name with an index of `repeat`
 _Loader: Any = getattr(yaml, "CSafeLoader", yaml.SafeLoader)
 
 
@@ -60,11 +57,9 @@ class Node:
     value: Any
     line: int
     text: str = ""
-    size: int = 1
-    """Number of nodes in it, with all aliases expanded."""
+    size: int = 1  # number of nodes in it, with all aliases expanded
     is_open: bool = False
-    keys: dict[Any, int] | None = None
-    """Line of every key of a mapping."""
+    keys: dict[Any, int] | None = None  # line of every key of a mapping
     children: dict[Any, Node] | None = None
     setting: str = ""
     """The command-line setting that the node and all nodes in it come from; empty if they are in the file."""
@@ -76,24 +71,19 @@ class Place:
 
     line: int
     key_line: int
-    text: str
-    """The text of the value in the file, if it is a scalar."""
-    setting: str = ""
-    """The command-line setting that it comes from; empty if it is in the file."""
+    text: str  # the text of the value in the file, if it is a scalar
+    setting: str = ""  # the command-line setting that it comes from; empty if it is in the file
 
 
 @dataclass(frozen=True)
 class Source:
     """The content of an experiment file, as plain data."""
 
-    file: str
-    """Name of the file, as given by the user."""
+    file: str  # name of the file, as given by the user
     data: Any
     top: Node | None = None
-    faults: tuple[Fault, ...] = ()
-    """Faults that did not prevent reading: duplicate keys and tags."""
-    settings: tuple[str, ...] = ()
-    """Overrides of the command line, as ``KEY=VALUE``."""
+    faults: tuple[Fault, ...] = ()  # faults that did not prevent reading: duplicate keys and tags
+    settings: tuple[str, ...] = ()  # overrides of the command line, as ``KEY=VALUE``
     origins: Mapping[Path_, Path_] = field(default_factory=dict)
     """Path in the file of every value that `repeat` expanded, by its path in the data."""
 
