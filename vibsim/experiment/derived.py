@@ -13,13 +13,7 @@ from vibsim.experiment.rules.members import update_tables
 from vibsim.experiment.rules.published import check_published
 from vibsim.experiment.rules.setting import Setting
 from vibsim.experiment.rules.timing import rising_levels
-from vibsim.experiment.schema.checks import (
-    Check,
-    ClaimCheck,
-    ConvergesCheck,
-    Members,
-    PublishedAt,
-)
+from vibsim.experiment.schema.checks import Check, ClaimCheck, ConvergesCheck, Members, PublishedAt
 from vibsim.experiment.schema.document import Levels
 from vibsim.experiment.schema.fields import FrozenDict
 from vibsim.experiment.schema.figures import LEVEL

@@ -119,11 +119,7 @@ def _plain(data: Any, name: str, depth: int = 0) -> Any:
 
 
 def build(
-    source: Source,
-    collection: str,
-    name: str,
-    file: Path | None = None,
-    kinds: Kinds | None = None,
+    source: Source, collection: str, name: str, file: Path | None = None, kinds: Kinds | None = None
 ) -> ExperimentSpec:
     """Validate the content of `source` and fill in every default.
 

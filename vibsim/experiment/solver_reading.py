@@ -32,13 +32,7 @@ from vibsim.experiment.schema.solver import (
     SolverDocument,
 )
 from vibsim.experiment.schema.sweep import swept_values
-from vibsim.experiment.solver import (
-    NO_MODULE,
-    OUTPUTS,
-    SolverExperiment,
-    SolverSpec,
-    placeholders,
-)
+from vibsim.experiment.solver import NO_MODULE, OUTPUTS, SolverExperiment, SolverSpec, placeholders
 from vibsim.experiment.tables.file import ENDINGS
 from vibsim.experiment.validation import read_document
 from vibsim.experiment.yaml.parse import Path_, Source, read

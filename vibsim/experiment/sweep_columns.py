@@ -83,9 +83,7 @@ def options_of(experiment: ExperimentSpec, columns: Columns, scheme: int, case: 
 
 
 def by_options(
-    experiment: ExperimentSpec,
-    columns: Columns,
-    function: Callable[[Scheme, Options], ArrayLike],
+    experiment: ExperimentSpec, columns: Columns, function: Callable[[Scheme, Options], ArrayLike]
 ) -> Floats:
     """Return `function` for every scheme and for the options of each member, shape (scheme, 1 or case, ...)."""
     rows = []

@@ -80,11 +80,7 @@ def time_spec(
 
 
 def _by_force(
-    section: TimeSection,
-    steps: int,
-    model: Model,
-    parameters: Mapping[str, float],
-    report: Report,
+    section: TimeSection, steps: int, model: Model, parameters: Mapping[str, float], report: Report
 ) -> TimeSpec | None:
     """Return the time of whole periods of a forcing frequency, with whole steps in each period."""
     assert section.periods is not None

@@ -13,10 +13,7 @@ import numpy as np
 from vibsim.core.array_types import Floats
 from vibsim.core.vocabulary import MEMBER
 from vibsim.report import frame, style
-from vibsim.report.data import (
-    Results,
-    largest,
-)
+from vibsim.report.data import Results, largest
 from vibsim.report.figures.panels import stacked
 from vibsim.report.style import Picture
 from vibsim.report.types import Axes

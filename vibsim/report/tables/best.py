@@ -12,11 +12,7 @@ from collections.abc import Collection, Iterator, Sequence
 from vibsim.comparison.best_values import WORDS, Scalar, scalars
 from vibsim.models import Model
 from vibsim.report import style, words
-from vibsim.report.data import (
-    Ladder,
-    Member,
-    Results,
-)
+from vibsim.report.data import Ladder, Member, Results
 from vibsim.report.tables.table import Cell, Column, Table, Written
 from vibsim.schemes.orders import is_autonomous
 

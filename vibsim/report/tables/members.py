@@ -15,9 +15,7 @@ from numpy.typing import NDArray
 
 from vibsim import store
 from vibsim.report import finest_level, words
-from vibsim.report.data import (
-    Results,
-)
+from vibsim.report.data import Results
 from vibsim.report.tables.table import Column, Table, csv_line
 
 LISTED = 10_000  # most rows of the table, and of a file with all digits of measured numbers
