@@ -17,14 +17,7 @@ from collections.abc import Callable, Sequence
 from contextlib import suppress
 from typing import NoReturn
 
-from vibsim.core.processes import (
-    ENDS,
-    adopt_orphans,
-    as_worker_of,
-    end_with,
-    heeded,
-    wait_for_signal,
-)
+from vibsim.core import processes
 
 _GRACE = 3.0  # time that a worker has to end by itself [s], and after that its children
 _PARENT = "VIBSIM_PARENT"
@@ -47,12 +40,12 @@ def supervised(work: Work) -> int:
     """
     if parent := os.environ.pop(_PARENT, ""):
         # a job of a run needs no supervisor: a signal may end it at any time, since files are written in one step
-        as_worker_of(int(parent))
+        processes.as_worker_of(int(parent))
         return work()
-    ends = heeded()
+    ends = processes.heeded()
     signal.signal(signal.SIGCHLD, signal.SIG_DFL)
     before = signal.pthread_sigmask(signal.SIG_BLOCK, ends | {signal.SIGCHLD})
-    adopt_orphans()
+    processes.adopt_orphans()
     supervisor = os.getpid()
     reading, writing = os.pipe()
     worker = os.fork()
@@ -108,7 +101,7 @@ def _on_signal(act: Callable[[int], None]) -> None:
     The signals are blocked in all threads, and this thread waits for them: a handler would interrupt the main thread at
     any point, with locks held.
     """
-    ends = heeded()
+    ends = processes.heeded()
     signal.pthread_sigmask(signal.SIG_BLOCK, ends)
     threading.Thread(target=lambda: act(signal.sigwait(ends)), daemon=True).start()
 
@@ -121,7 +114,7 @@ def take_time(seconds: float) -> None:
 def ended_by(status: int) -> int:
     """Return the signal of `ENDS` that ended a process, from its exit status as `subprocess` returns it; else 0."""
     number = -status if status < 0 else status - 128
-    return number if number in ENDS else 0
+    return number if number in processes.ENDS else 0
 
 
 def check_interrupted() -> None:
@@ -152,7 +145,7 @@ def _work(
         for number in ends:
             signal.signal(number, _interrupt)
         signal.pthread_sigmask(signal.SIG_SETMASK, mask)
-        end_with(supervisor)
+        processes.end_with(supervisor)
         status = work()
     except Interrupted as request:
         status = 128 + request.number
@@ -168,7 +161,7 @@ def _interrupt(number: int, _: object) -> None:
     """Raise `Interrupted`, once; errors in destructors on the way out are not shown."""
     global _request
     _request = number
-    for other in ENDS:
+    for other in processes.ENDS:
         signal.signal(other, signal.SIG_IGN)
     sys.unraisablehook = lambda _: None
     raise Interrupted(number)
@@ -179,7 +172,7 @@ def _watch(worker: int, ends: set[signal.Signals]) -> tuple[int, int]:
     signalled, deadline = 0, 0.0
     while True:
         timeout = max(deadline - time.monotonic(), 0) if signalled else 3600.0
-        received = wait_for_signal(ends | {signal.SIGCHLD}, timeout)
+        received = processes.wait_for_signal(ends | {signal.SIGCHLD}, timeout)
         if (status := _ended(worker)) is not None:
             return status, signalled
         if received == signal.SIGCHLD:

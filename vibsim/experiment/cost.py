@@ -278,18 +278,12 @@ def analysis_written(levels: Sequence[LevelCost], members: int, is_lean: bool) -
 
 def level_cost(experiment: ExperimentSpec, level: int) -> LevelCost:
     """Return the cost of `level` of `experiment`."""
-    from vibsim.experiment.storage import (
-        event_times,
-        extrema_kept,
-        is_bounded,
-        sampling,
-        stored_series,
-    )
+    from vibsim.experiment import storage
     from vibsim.models import has_solution
     from vibsim.schemes.adaptive import seconds
 
     model, steps = experiment.model.definition, experiment.steps(level)
-    lean = is_bounded(experiment)
+    lean = storage.is_bounded(experiment)
     kinds = [experiment.schemes[i].method for i in experiment.ladder]
     # the engine does not step a linear structure
     stepped = kinds if model.loaded is None else []
@@ -310,13 +304,13 @@ def level_cost(experiment: ExperimentSpec, level: int) -> LevelCost:
     return LevelCost(
         schemes=len(experiment.schemes),
         steps=steps,
-        samples=steps // sampling(experiment, level) + 1,
-        series=len(stored_series(experiment)),
+        samples=steps // storage.sampling(experiment, level) + 1,
+        series=len(storage.stored_series(experiment)),
         exact=len(model.states) if has_exact and not lean else 0,
         work=sum(explicit for explicit, _ in works),
         iterated=sum(iterated for _, iterated in works),
-        extrema=0 if lean else extrema_kept(experiment.trajectories),
-        events=event_times(experiment),
+        extrema=0 if lean else storage.extrema_kept(experiment.trajectories),
+        events=storage.event_times(experiment),
         d2t=experiment.own_velocity or not lean,
         scipy_seconds=shared + structure_seconds,
         shared=shared,

@@ -5,16 +5,7 @@ from __future__ import annotations
 from argparse import Namespace
 from typing import TYPE_CHECKING
 
-from vibsim.cli.jobs.common import (
-    COMPARED,
-    check_digest,
-    check_to_write,
-    on_record,
-    one_plan,
-    open_levels,
-    titled,
-    with_settings,
-)
+from vibsim.cli.jobs import common
 from vibsim.plan.digests import analysed
 
 if TYPE_CHECKING:
@@ -24,9 +15,9 @@ if TYPE_CHECKING:
 def analyse(options: Namespace) -> int:
     """Compare all levels; write ``convergence.nc`` and ``summary.json``."""
     if options.out is not None:
-        check_to_write("--out", options.out)
-    plan, results = one_plan(options)
-    check_digest(plan, options.digest, plan.analysis)
+        common.check_to_write("--out", options.out)
+    plan, results = common.one_plan(options)
+    common.check_digest(plan, options.digest, plan.analysis)
     if plan.has_solver:
         from vibsim.cli.jobs.judge_levels import judge_levels
 
@@ -37,16 +28,16 @@ def analyse(options: Namespace) -> int:
     experiment = plan.experiment
     folder = options.out or results / plan.key
     thin: list[Record] = []
-    with on_record(options, results, plan.key, COMPARED, plan.analysis):
-        with open_levels(plan, options, results) as levels:
+    with common.on_record(options, results, plan.key, common.COMPARED, plan.analysis):
+        with common.open_levels(plan, options, results) as levels:
             compared = analyse_parts(experiment, levels, processes=options.threads)
             parts = keep_for_verdicts(experiment, compared, thin)
             store.write_parts(
                 folder / "convergence.nc",
-                (titled(part, f"{plan.key}: comparison of levels") for part in parts),
+                (common.titled(part, f"{plan.key}: comparison of levels") for part in parts),
                 cases=plan.cases,
                 digest=plan.analysis,
-                provenance=with_settings(plan, analysed(plan.content)),
+                provenance=common.with_settings(plan, analysed(plan.content)),
             )
         record = join_parts(thin)
         summary = summarise(experiment, verdicts(experiment, record), record)

@@ -4,15 +4,7 @@ from __future__ import annotations
 
 from argparse import Namespace
 
-from vibsim.cli.jobs.common import (
-    check_digest,
-    on_record,
-    one_plan,
-    open_levels,
-    provenance,
-    refusal,
-    titled,
-)
+from vibsim.cli.jobs import common
 from vibsim.plan.digests import extrapolated
 
 PART_BYTES = 64 * 10**6  # bytes, over all levels, that an extrapolation reads at a time
@@ -20,17 +12,17 @@ PART_BYTES = 64 * 10**6  # bytes, over all levels, that an extrapolation reads a
 
 def extrapolate(options: Namespace) -> int:
     """Extrapolate the solution over all levels; write ``best.nc``."""
-    plan, results = one_plan(options)
+    plan, results = common.one_plan(options)
     if plan.best is None:
-        raise refusal("EXPERIMENT", options.experiment, "does not have `output: best`")
-    check_digest(plan, options.digest, plan.extrapolation)
+        raise common.refusal("EXPERIMENT", options.experiment, "does not have `output: best`")
+    common.check_digest(plan, options.digest, plan.extrapolation)
     from vibsim import store
     from vibsim.comparison.best_solution import best_record
 
     size = max(1, PART_BYTES * plan.cases // plan.bytes)
     with (
-        on_record(options, results, plan.key, ["best.nc"], plan.extrapolation),
-        open_levels(plan, options, results) as levels,
+        common.on_record(options, results, plan.key, ["best.nc"], plan.extrapolation),
+        common.open_levels(plan, options, results) as levels,
     ):
         ranges = ((i, min(i + size, plan.cases)) for i in range(0, plan.cases, size))
         parts = (
@@ -39,9 +31,9 @@ def extrapolate(options: Namespace) -> int:
         )
         store.write_parts(
             options.out or results / plan.best,
-            (titled(part, f"{plan.key}: extrapolated over all levels") for part in parts),
+            (common.titled(part, f"{plan.key}: extrapolated over all levels") for part in parts),
             cases=plan.cases,
             digest=plan.extrapolation,
-            provenance=provenance(plan, extrapolated(plan.content)),
+            provenance=common.provenance(plan, extrapolated(plan.content)),
         )
     return 0

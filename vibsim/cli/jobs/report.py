@@ -9,16 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from vibsim.cli import made_files
-from vibsim.cli.jobs.common import (
-    check_digest,
-    check_to_write,
-    chosen_results,
-    on_record,
-    one_plan,
-    read_all,
-    refusal,
-    with_settings,
-)
+from vibsim.cli.jobs import common
 from vibsim.core.errors import nearest
 from vibsim.core.vocabulary import FIGURE_FORMATS
 from vibsim.experiment import citation
@@ -27,12 +18,12 @@ from vibsim.experiment import citation
 def report(options: Namespace) -> int:
     """Write the report of one experiment, or the index of all results."""
     if options.out is not None:
-        check_to_write("--out", options.out)
+        common.check_to_write("--out", options.out)
     if options.experiment is None:
         return _index(options)
     formats = _formats(options)
-    plan, results = one_plan(options)
-    check_digest(plan, options.digest, plan.report)
+    plan, results = common.one_plan(options)
+    common.check_digest(plan, options.digest, plan.report)
     from vibsim import store
     from vibsim.report import write
 
@@ -42,23 +33,23 @@ def report(options: Namespace) -> int:
         plan.convergence: partial(store.read, digest=plan.analysis),
         plan.summary: partial(store.read_json, digest=plan.analysis, name=plan.key),
     }
-    contents = read_all(options, results, readers)
+    contents = common.read_all(options, results, readers)
     summary = contents[plan.summary]
     heading = {"title": plan.title, "source": citation.fields(plan.source)}
     if summary != summary | heading:
         summary |= heading
         if options.out is None:
             # No number depends on title and source: if they change, the analysis does not run again.
-            with on_record(options, results, plan.key, ["summary.json"], plan.analysis):
+            with common.on_record(options, results, plan.key, ["summary.json"], plan.analysis):
                 store.write_json(results / plan.summary, summary, digest=plan.analysis)
-    with on_record(options, results, plan.key, ["report.html"], plan.report):
+    with common.on_record(options, results, plan.key, ["report.html"], plan.report):
         write(
             plan,
             contents[plan.convergence],
             summary,
             options.out or results / plan.key,
             formats=formats,
-            provenance=with_settings(plan, plan.content) | {"digest": plan.analysis},
+            provenance=common.with_settings(plan, plan.content) | {"digest": plan.analysis},
         )
     return 0
 
@@ -69,11 +60,13 @@ def _index(options: Namespace) -> int:
         value = getattr(options, name)
         if value:
             text = "" if value is True else value
-            raise refusal(f"--{name}", text, "belongs to the report of one experiment: name it")
+            raise common.refusal(
+                f"--{name}", text, "belongs to the report of one experiment: name it"
+            )
     from vibsim.report import write_index
 
-    results = chosen_results(options)
-    with on_record(options, results, made_files.INDEX, made_files.OVER_ALL):
+    results = common.chosen_results(options)
+    with common.on_record(options, results, made_files.INDEX, made_files.OVER_ALL):
         write_index(options.out or results)
     return 0
 
@@ -84,5 +77,5 @@ def _formats(options: Namespace) -> list[str]:
     unknown = [name for name in chosen if name not in FIGURE_FORMATS]
     if unknown:
         hint = nearest(unknown[0], FIGURE_FORMATS)
-        raise refusal("--formats", ",".join(unknown), "unknown format", hint)
+        raise common.refusal("--formats", ",".join(unknown), "unknown format", hint)
     return chosen

@@ -10,18 +10,10 @@ from typing import Any
 from vibsim.core.errors import nearest
 from vibsim.core.vocabulary import BY_TOLERANCE, REASONS, is_error_part, plain_name
 from vibsim.experiment.faults import Report
+from vibsim.experiment.rules import values
 from vibsim.experiment.rules.check_places import Scope
 from vibsim.experiment.rules.quantities import check_velocities, is_quantity, vectors_of
 from vibsim.experiment.rules.setting import Setting
-from vibsim.experiment.rules.values import (
-    ENERGIES,
-    check_exact,
-    check_quantity_of,
-    check_theory,
-    instead_of_energy,
-    refuse_followers,
-    value_named,
-)
 from vibsim.experiment.schema.checks import (
     SOLUTIONS,
     AccurateCheck,
@@ -98,7 +90,7 @@ def _check(check: Check, scope: Scope) -> None:
             model = scope.setting.model
             if model is not None and not model.conservative:
                 scope.refuse(
-                    f"the energy of {model.kind} is not conserved", instead_of_energy(scope)
+                    f"the energy of {model.kind} is not conserved", values.instead_of_energy(scope)
                 )
         case EqualCheck():
             _check_equal(inner, scope)
@@ -187,13 +179,13 @@ def _check_value_check(check: ValueCheck, scope: Scope) -> None:
                 scope.at(name).refuse("is used with equals only", at_key=True)
     place = scope.at("at")
     _check_reduction(check, scope)
-    row = value_named(check.value, scope.at("value"))
+    row = values.value_named(check.value, scope.at("value"))
     if row is None:
         place.check_scheme_and_case(check.at)
         return
     if row.is_angle and check.take in OF_THE_SAME_KIND:
         _check_angle(check, scope)
-    check_quantity_of(row, check.quantity, check.at.level == "best", scope)
+    values.check_quantity_of(row, check.quantity, check.at.level == "best", scope)
     if check.quantity is not None and check.at.scheme is not None:
         check_velocities(check.quantity, [(check.at.scheme, place.at("scheme"))])
     place.check_place(check.at, row)
@@ -268,16 +260,16 @@ def _check_equal(check: EqualCheck, scope: Scope) -> None:
     if check.second in SOLUTIONS and setting.model is not None:
         what, choices = check.second, tuple(state.name for state in setting.model.states)
         if check.second == "exact":
-            choices += ENERGIES
+            choices += values.ENERGIES
             if plain_name(check.quantity) in choices and setting.own_velocity:
                 choices += (check.quantity,)
     if is_quantity(check.quantity, choices, scope.at("quantity"), what):
         check_velocities(check.quantity, named)
         if check.second == "exact" and setting.sweep.follow:
-            refuse_followers(check.second, second)
+            values.refuse_followers(check.second, second)
         elif check.second == "exact":
-            check_exact(check.quantity, check.second, second)
+            values.check_exact(check.quantity, check.second, second)
         elif check.second == "discrete":
-            check_theory(check.second, second)
+            values.check_theory(check.second, second)
     if check.second == "discrete" and check.first in setting.adaptive:
         first.refuse("chooses its own steps, for which theory knows no solution", value=check.first)

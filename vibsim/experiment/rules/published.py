@@ -6,15 +6,10 @@ from collections.abc import Iterable, Sequence
 from typing import Any
 
 from vibsim.experiment.faults import Report
+from vibsim.experiment.rules import values
 from vibsim.experiment.rules.check_places import Scope
 from vibsim.experiment.rules.quantities import check_velocities
 from vibsim.experiment.rules.setting import Setting
-from vibsim.experiment.rules.values import (
-    check_quantity_of,
-    check_support,
-    quantities_of,
-    value_named,
-)
 from vibsim.experiment.schema.published import row_at, row_id
 
 
@@ -37,22 +32,22 @@ def check_published(
 
 def _check_table(table: Any, scope: Scope) -> None:
     rows = [(row, scope.at("rows", j)) for j, row in enumerate(table.rows) if row is not None]
-    row = None if table.value is None else value_named(table.value, scope.at("value"))
+    row = None if table.value is None else values.value_named(table.value, scope.at("value"))
     if row is not None and not scope.at("quantity").is_faulty:
         best = any(printed.level == "best" for printed, _ in rows)
-        check_quantity_of(row, table.quantity, best, scope)
+        values.check_quantity_of(row, table.quantity, best, scope)
     for j, name in enumerate(table.beside):
         place = scope.at("beside", j)
-        other = value_named(name, place)
+        other = values.value_named(name, place)
         if name in table.beside[:j]:
             place.refuse("a value must not be repeated", value=name)
         if other is not None:
             # a value that needs a quantity has that of the table
-            choices = quantities_of(other, scope.setting)
+            choices = values.quantities_of(other, scope.setting)
             if choices and table.quantity not in choices:
                 rule = f"{name} is not defined for the quantity of this table"
                 place.refuse(rule, "it is defined for " + ", ".join(choices), name)
-            check_support(other, table.quantity, place)
+            values.check_support(other, table.quantity, place)
     for printed, place in rows:
         if row is not None:
             place.check_place(row_at(printed), row)
