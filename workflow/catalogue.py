@@ -18,13 +18,13 @@ from typing import Any
 import yaml
 
 from vibsim.experiment import Experiment, citation
-from vibsim.report.page.source_statements import CONFIRMED, CORRECTED, CORRECTION, OPEN
+from vibsim.report.page.sources import CONFIRMED, CORRECTED, CORRECTION, OPEN
 from vibsim.report.text import assertions
 
 ROOT = Path(__file__).resolve().parents[1]
 PAGE = ROOT / "docs" / "catalogue.md"
 SECTIONS = ROOT / "vibsim" / "report" / "templates" / "sections.json"
-"""The sections of the texts, for the index of results (`vibsim.report.page.source_sections`)."""
+"""The sections of the texts, for the index of results (`vibsim.report.page.sources`)."""
 TEXTS = ("pendulum lecture", "vibration text")
 PROVIDED = "PROVIDED"
 EXERCISES = "Exercises"

@@ -15,7 +15,7 @@ from test_page import make, read
 from vibsim import report, store
 from vibsim.experiment import citation
 from vibsim.report import words
-from vibsim.report.page import cards, history, source_sections
+from vibsim.report.page import cards, history, sources
 from vibsim.report.page.index import Headline, headline
 
 
@@ -67,7 +67,7 @@ def test_the_index_links_to_the_documentation_where_it_has_been_built(tmp_path):
 
 
 def test_sections_of_the_texts_lead_to_pages_that_are_there_and_name_the_other_experiments():
-    (lecture, sections), (text, others) = source_sections.listed(
+    (lecture, sections), (text, others) = sources.sections(
         {"pendulum_lab/theta_convergence": "page.html"}
     )
     assert (lecture, text) == ("pendulum lecture", "vibration text")

@@ -15,8 +15,7 @@ from vibsim.experiment import Experiment
 from vibsim.experiment.schema.figures import KINDS
 from vibsim.report import choice, style
 from vibsim.report.figures import accuracy, of_source
-from vibsim.report.page import player
-from vibsim.report.tables import source_figures
+from vibsim.report.page import player, sources
 
 ROOT = Path(__file__).parents[2]
 CONFIGS = ROOT / "configs"
@@ -297,20 +296,20 @@ def test_the_page_the_table_and_the_index_name_the_figures(tmp_path) -> None:
     assert page.count('id="phase_plane_0"') == 1
     assert "A text, figure 12: in motion" in page
     (folder / "summary.json").write_text("{}")
-    found = source_figures.listed(tmp_path, [folder, tmp_path / "a/missing"])
+    found = sources.figures(tmp_path, [folder, tmp_path / "a/missing"])
     assert [(figure, [(p.name, p.link) for p in places]) for figure, places in found] == [
         ("a text, figure 1", [("theta", "pendulum_lab/theta/report.html#phase_plane_0")]),
         ("a text, figure 12", [("theta", "pendulum_lab/theta/report.html#player")]),
     ]
     rows = "figure,shows,place\nfigure 10,path,a\nfigure 2,path,b\nfigure 2,path,c\n,path,d\nfigure 3,path,\n"
-    (folder / source_figures.FILE).write_text(rows)
-    found = source_figures.listed(tmp_path, [folder])
+    (folder / sources.FIGURES).write_text(rows)
+    found = sources.figures(tmp_path, [folder])
     assert [(figure, [p.link[-2:] for p in places]) for figure, places in found] == [
         ("figure 2", ["#b"]),
         ("figure 10", ["#a"]),
     ]
-    (folder / source_figures.FILE).write_bytes(b"\xff\x00")
-    assert source_figures.listed(tmp_path, [folder]) == []
+    (folder / sources.FIGURES).write_bytes(b"\xff\x00")
+    assert sources.figures(tmp_path, [folder]) == []
 
 
 def test_a_spectrum_shows_the_frequency_that_theory_knows() -> None:

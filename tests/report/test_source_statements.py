@@ -9,7 +9,7 @@ import samples
 
 from vibsim import report, store
 from vibsim.experiment import citation
-from vibsim.report.page.source_statements import listed
+from vibsim.report.page.sources import statements
 
 
 def check(source: str | None, expected: str = "true", status: str = "PASS", **changes):
@@ -23,7 +23,7 @@ def check(source: str | None, expected: str = "true", status: str = "PASS", **ch
 
 
 def headings(*sources: str | None) -> list[str]:
-    return [heading for heading, _ in listed([("one", "", [check(s) for s in sources])])]
+    return [heading for heading, _ in statements([("one", "", [check(s) for s in sources])])]
 
 
 def test_statements_stand_under_their_sections_in_order() -> None:
@@ -35,7 +35,7 @@ def test_statements_stand_under_their_sections_in_order() -> None:
 
 def test_what_names_no_place_or_is_no_claim_is_left_out() -> None:
     assert headings(None, "beside the text") == []
-    assert listed([("one", "", [check("b, section 2", kind="value")])]) == []
+    assert statements([("one", "", [check("b, section 2", kind="value")])]) == []
 
 
 @pytest.mark.parametrize(
@@ -51,7 +51,9 @@ def test_what_names_no_place_or_is_no_claim_is_left_out() -> None:
 def test_a_refuted_statement_is_never_confirmed(
     source: str, expected: str, status: str, badge: str
 ) -> None:
-    ((heading, [row]),) = listed([("one", "one/report.html", [check(source, expected, status)])])
+    ((heading, [row]),) = statements(
+        [("one", "one/report.html", [check(source, expected, status)])]
+    )
     assert (heading, row.badge) == ("b, section 2", badge)
     before = "What is right: " if source.startswith("correction") else ""
     assert row.text == f"{before}it falls. The statement is true."

@@ -15,9 +15,8 @@ from vibsim.core.vocabulary import SEVERITY, is_trap, worst
 from vibsim.experiment import citation
 from vibsim.experiment.collection import ADHOC, SITE
 from vibsim.report import words
-from vibsim.report.page import history, source_sections, source_statements
+from vibsim.report.page import history, sources
 from vibsim.report.page.templates import digest_of, environment, source
-from vibsim.report.tables import source_figures
 from vibsim.report.tables.table import Column, Table, to_csv
 
 UNREADABLE = ("DAMAGED", "MISSING")
@@ -122,9 +121,9 @@ def write_index(results: Path) -> None:
         "filters": [(tag, word, tags.count(tag)) for tag, word in FILTERS],
         "own": [row for row in rows if row.collection == ADHOC],
         "shipped": [(key, list(group)) for key, group in groupby(shipped, lambda r: r.collection)],
-        "figures": source_figures.listed(results, sorted(folders)),
-        "statements": source_statements.listed((row.name, row.link, row.checks) for row in rows),
-        "sections": source_sections.listed({row.key: row.link for row in rows if row.link}),
+        "figures": sources.figures(results, sorted(folders)),
+        "statements": sources.statements((row.name, row.link, row.checks) for row in rows),
+        "sections": sources.sections({row.key: row.link for row in rows if row.link}),
         "site": f"{SITE}/index.html" if (results / SITE / "index.html").is_file() else "",
         "history": history.FILE,
         "script": source("index.js"),
