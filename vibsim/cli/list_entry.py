@@ -147,7 +147,11 @@ def model_rows(model: Model) -> Iterator[Row]:
     yield from _under(
         "parameters", (f"{row.key}: {parameter_text(row)}" for row in model.parameters)
     )
-    yield from _under("formulas", map(_formula, model.formulas))
+    formulas = (
+        f"{row.name}: {row.description}" + f" (default {row.default})" * bool(row.default)
+        for row in model.formulas
+    )
+    yield from _under("formulas", formulas)
     if model.takes_events:
         text = (
             "events: states get new values where a formula crosses 0; stop: the motion ends there"
@@ -168,10 +172,6 @@ def _under(label: str, texts: Iterable[str]) -> Iterator[Row]:
 
 def _quantity(row: State | Output) -> str:
     return f"{row.name}: {row.long_name}{unit_text(row.unit)}"
-
-
-def _formula(row: FormulaField) -> str:
-    return f"{row.name}: {row.description}" + (f" (default {row.default})" if row.default else "")
 
 
 def needed(model: Model) -> tuple[FormulaField, ...]:

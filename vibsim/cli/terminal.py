@@ -9,7 +9,6 @@ from __future__ import annotations
 import os
 import shutil
 import sys
-from typing import TextIO
 
 UNCUT = 10_000  # width of output that goes to a file, so that it is never cut
 FRAME = 6
@@ -29,15 +28,10 @@ def rows(taken: int = 0) -> int:
     return max(shutil.get_terminal_size().lines - taken - FRAME, 10)
 
 
-def has_colours(stream: TextIO) -> bool:
-    """Tell whether to use colours on `stream`."""
-    plain = os.environ.get("NO_COLOR") or os.environ.get("TERM") == "dumb"
-    return stream.isatty() and not plain
-
-
-def painted(text: str, colour: str, stream: TextIO | None = None) -> str:
+def painted(text: str, colour: str) -> str:
     """Return a text in the colour of a status, or ``faint`` or ``bold``; any other `colour` leaves it unchanged."""
-    if colour not in _COLOURS or not has_colours(stream or sys.stdout):
+    is_plain = os.environ.get("NO_COLOR") or os.environ.get("TERM") == "dumb"
+    if is_plain or colour not in _COLOURS or not sys.stdout.isatty():
         return text
     return f"\033[{_COLOURS[colour]}m{text}\033[0m"
 

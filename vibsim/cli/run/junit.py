@@ -38,15 +38,16 @@ def write(path: Path, summaries: Sequence[Entry], failures: Sequence[Entry]) -> 
     for entry in summaries:
         suite = SubElement(root, "testsuite", name=f"{entry['collection']}/{entry['experiment']}")
         for check in entry["checks"]:
-            _check(suite, entry, check)
+            _check(_case(suite, entry, check["id"]), check)
         if "error" in entry:
-            _case(suite, entry, "verdicts", "error", "no_verdicts", str(entry["error"]), "")
+            case = _case(suite, entry, "verdicts")
+            _problem(case, "error", "no_verdicts", str(entry["error"]))
     if failures:
         suite = SubElement(root, "testsuite", name=JOBS)
         for failure in failures:
+            case = _case(suite, {"collection": "vibsim", "experiment": "jobs"}, failure["job"])
             lines = "\n".join(map(clean, failure["tail"]))
-            case = {"collection": "vibsim", "experiment": "jobs"}
-            _case(suite, case, failure["job"], "error", "failed_job", "the job failed", lines)
+            _problem(case, "error", "failed_job", "the job failed", lines)
     for element in (*root, root):
         counts = {
             "tests": len(element.findall(".//testcase")),
@@ -59,27 +60,19 @@ def write(path: Path, summaries: Sequence[Entry], failures: Sequence[Entry]) -> 
     write_text(path, f'<?xml version="1.0" encoding="UTF-8"?>\n{text}\n')
 
 
-def _check(suite: Element, entry: Entry, check: Entry) -> None:
+def _check(case: Element, check: Entry) -> None:
     if check["status"] == "PASS":
-        case = _case(suite, entry, check["id"])
         SubElement(case, "system-out").text = clean(check["text"])
         return
     details = "\n".join(clean(text) for text in (check["text"], check["advice"]) if text)
     message = f"{check['status']}: {check['reason']}"
-    _case(suite, entry, check["id"], "failure", str(check["reason"]), message, details)
+    _problem(case, "failure", str(check["reason"]), message, details)
 
 
-def _case(
-    suite: Element,
-    entry: Entry,
-    name: str,
-    problem: str = "",
-    kind: str = "",
-    message: str = "",
-    text: str = "",
-) -> Element:
+def _case(suite: Element, entry: Entry, name: str) -> Element:
     experiment = f"{entry['collection']}.{entry['experiment']}"
-    case = SubElement(suite, "testcase", classname=experiment, name=clean(name))
-    if problem:
-        SubElement(case, problem, type=kind, message=clean(message)).text = text
-    return case
+    return SubElement(suite, "testcase", classname=experiment, name=clean(name))
+
+
+def _problem(case: Element, tag: str, kind: str, message: str, text: str = "") -> None:
+    SubElement(case, tag, type=kind, message=clean(message)).text = text
