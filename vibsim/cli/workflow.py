@@ -16,16 +16,10 @@ from vibsim.plan import Names
 def names_of(config: Mapping[str, Any], command_line: Mapping[str, Any]) -> Names:
     """Return the names for the workflow.
 
-    Raises InputError where an experiment file or the results folder is refused, or a program is not allowed to run.
-
-    Parameters
-    ----------
-    config
-        ``experiments`` (files, names or collections) and the ``settings`` of all of them, each one text or a list of
-        texts, by default the default experiments without settings; the ``results`` folder, by default
-        `vibsim.core.home.default_results`; and ``cores``, ``overhead`` and ``here`` as in `vibsim.plan.Names`.
-    command_line
-        The values of ``--config`` on the command line alone: ``allow_commands=true`` lets users' programs run.
+    `config` has ``experiments`` (files, names or collections) and the ``settings`` of all of them, each one text or a
+    list, by default the default experiments without settings; the ``results`` folder; and ``cores``, ``overhead`` and
+    ``here`` as in `vibsim.plan.Names`. Of ``--config`` on the command line alone, ``allow_commands=true`` lets users'
+    programs run. Raises InputError where a file or the folder is refused, or a program is not allowed to run.
     """
     is_allowed = str(command_line.get("allow_commands")).lower() == "true"
     experiments, settings = (

@@ -25,12 +25,9 @@ _FAULTY: Any = object()  # marks a value that is left out
 def read_document(report: Report, kind: type[Section] = Document) -> Any:
     """Return the content of the file of `report`, and report the faults of its values.
 
-    Returns
-    -------
-    Document
-        Or another `kind`, whose numbers have no units. Faulty values are left out. A faulty required section is None,
-        and so is a faulty entry of `schemes`, `checks` and `published`. Checks and the sweep keep their valid values
-        (`Section.stand_ins`).
+    Another `kind` than `Document` has no units. Faulty values are left out. A faulty required section is None, and so
+    is a faulty entry of `schemes`, `checks` and `published`. Checks and the sweep keep their valid values
+    (`Section.stand_ins`).
     """
     fields = kind.model_fields
     # an empty optional section counts as missing

@@ -92,10 +92,7 @@ def experiments(results: Path) -> list[str]:
 def compare(results: Path, key: str) -> tuple[int, dict[str, str]]:
     """Compare every file of an experiment, or of the index (`made_files.INDEX`), with the manifest; change nothing.
 
-    Returns
-    -------
-    tuple[int, dict[str, str]]
-        The number of files in the manifest, and the problems by path relative to `results`.
+    Return the number of files in the manifest, and the problems by path relative to `results`.
     """
     folder = results / key
     known, is_intact = made_files.read(results, key)

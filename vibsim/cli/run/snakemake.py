@@ -157,18 +157,9 @@ def run(
     target: Executor,
     progress: Progress | None = None,
 ) -> Outcome:
-    """Run Snakemake on `plans` and return when it has ended.
+    """Run Snakemake on `plans` and return when it has ended; it inherits the descriptor of the lock of `results`.
 
     Raises Interrupted where SIGHUP, SIGINT or SIGTERM ended Snakemake, and VibsimError where another signal killed it.
-
-    Parameters
-    ----------
-    results, lock_fd
-        The results folder, and the lock_fd of its lock, which Snakemake inherits.
-    target
-        Where jobs run.
-    progress
-        Display of the progress, if any.
     """
     results_folder.clean(results, [plan.key for plan in plans])
     config = _write_config(plans, results, target)
@@ -225,7 +216,7 @@ def _write_config(plans: Sequence[Plan], results: Path, target: Executor) -> Pat
 
 
 def _command(config: Path, results: Path, target: Executor, pipe: int) -> list[str]:
-    """Return the command that starts Snakemake, which writes its events to the lock_fd `pipe`."""
+    """Return the command that starts Snakemake, which writes its events to the descriptor `pipe`."""
     command = [sys.executable, "-P", "-m", "vibsim.cli.run.snakemake_process", str(os.getpid())]
     command.append("remote" if target.is_remote else "extended" if target.is_extended else "here")
     command += ["--logger", "vibsim", "--logger-vibsim-pipe", str(pipe)]

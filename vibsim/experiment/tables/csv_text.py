@@ -97,19 +97,11 @@ def read(
 ) -> tuple[list[Floats], Integers]:
     """Return the chosen columns of the content of a file, and the line number of every row, from 1.
 
+    `choose` returns the indices of the columns to read, from 0; the others may contain anything. Its arguments are the
+    names of all columns, and whether the first row has at least two numbers; otherwise the text may not be a table, and
+    messages do not show it. `most` is the largest number of rows. To `written`, if given, the cells of these columns in
+    the first `ROWS_WRITTEN` rows are appended, with decimal points and all zeros, which are digits of what was printed.
     Raises `CsvError` if these columns are not a table of numbers.
-
-    Parameters
-    ----------
-    choose
-        Returns the indices of the columns to read, from 0; the others may contain anything. Its arguments are the names
-        of all columns, and whether the first row has at least two numbers; otherwise the text may not be a table, and
-        messages do not show it.
-    most
-        Largest number of rows.
-    written
-        If given, the cells of these columns in the first `ROWS_WRITTEN` rows are appended to it, with decimal points.
-        They keep zeros at the end, which are digits of what was printed.
     """
     source = _Rows(content)
     rows = iter(source)

@@ -103,20 +103,11 @@ def film(
     periods: float | None = None,
     most: int = MOST_FRAMES,
 ) -> Film:
-    """Return the content of the movie of one or two runs.
+    """Return the content of the movie of one or two runs; the level record of the first one has the units.
 
-    Parameters
-    ----------
-    record
-        The level record of the first run, for units.
-    fps
-        Frames a second; a period takes `moments.SECONDS_A_PERIOD` unless that needs more than `most` frames.
-    frames
-        Number of frames, spread evenly over the whole time; default: as many as the motion needs, at most `most`.
-    start, end
-        First and last time shown; default: those of the shortest run.
-    periods
-        Width of the moving window; default: the whole time, or some periods of a long run.
+    A period takes `moments.SECONDS_A_PERIOD` unless that needs more than `most` frames; a number of `frames` is spread
+    evenly over the whole time. By default the movie shows the whole time of the shortest run, through a window that is
+    as wide, or of some `periods` of a long run.
     """
     first = runs[0]
     period = moments.period(first.t, np.nan_to_num(first.series, posinf=0.0, neginf=0.0))

@@ -22,14 +22,9 @@ _BEFORE, _BEHIND = "vibsimHistory = ", ";\n"
 
 
 def update(results: Path, found: Mapping[str, tuple[str, str]]) -> None:
-    """Write the file anew after a run that changed any result.
+    """Write the file anew after a run that changed any result; without ``.vibsim``, which a run makes, do nothing.
 
-    Parameters
-    ----------
-    results
-        Folder of results; without ``.vibsim`` in it, which a run makes, nothing is written.
-    found
-        Status and headline number of every experiment by its key, ``<collection>/<name>``.
+    `found` has status and headline number of every experiment by its key, ``<collection>/<name>``.
     """
     if not (results / ".vibsim").is_dir():
         return

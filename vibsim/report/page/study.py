@@ -42,18 +42,9 @@ def write(
     directory: Path,
     content: Mapping[str, Any],
 ) -> None:
-    """Write ``report.html`` and ``verdict.json``.
+    """Write ``report.html``, and ``verdict.json`` with the `content` that the command prints.
 
-    Parameters
-    ----------
-    verdicts
-        One for each quantity.
-    sources
-        Names of the files that each was read from.
-    directory
-        Folder to write to, which is created.
-    content
-        The verdicts as the command prints them.
+    There is one verdict for each quantity; `sources` are the names of the files that each was read from.
     """
     cards = [
         card(str(i), verdict, _expectation(verdict), files)
