@@ -20,8 +20,7 @@ LISTS = ("models", "schemes", "checks", "experiments", "schema")
 SHELLS = ("bash", "zsh", "fish", "words")
 _Row = tuple[tuple[str, ...], dict[str, Any]]
 """Names of an option or of a positional argument, and its keyword arguments for `argparse`."""
-Command = tuple[str, str, str, Sequence[_Row]]
-"""Name of a command, module of its function, description, and options."""
+Command = tuple[str, str, str, Sequence[_Row]]  # name, module of the function, description, options
 
 
 def parser() -> argparse.ArgumentParser:

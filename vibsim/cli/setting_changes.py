@@ -8,10 +8,8 @@ from typing import Any, NamedTuple
 
 from vibsim.cli.terminal import clean
 
-_LONGEST = 48
-"""Most characters of a value that is shown; for a longer value only the change is mentioned."""
-_NAMES = ("collection", "name", "vibsim_format")
-"""Fields that identify an experiment and are no settings."""
+_LONGEST = 48  # most characters of a value that is shown; of a longer one only the change
+_NAMES = ("collection", "name", "vibsim_format")  # identify an experiment, and are no settings
 
 
 class Change(NamedTuple):

@@ -11,8 +11,7 @@ import shutil
 import sys
 
 UNCUT = 10_000  # width of output that goes to a file, so that it is never cut
-FRAME = 6
-"""Lines around a plot: its title, its heads, what it leaves out, empty lines and the prompt."""
+FRAME = 6  # lines around a plot: title, heads, what it leaves out, empty lines and the prompt
 _COLOURS = {"PASS": "32", "FAIL": "31", "INCONCLUSIVE": "33", "faint": "2", "bold": "1"}
 
 

@@ -20,8 +20,7 @@ from vibsim.experiment.yaml.parse import Path_
 from vibsim.models.shared.coordinates import MOST
 
 COUNT = "n"
-REPEATED = "outputs", "potential", "kinetic", "exact"
-"""Keys of a model that may contain the index, besides the coordinates."""
+REPEATED = "outputs", "potential", "kinetic", "exact"  # keys of a model that may contain the index
 _BEYOND = re.compile(r"(\w+)\{\w+\s*([+-])\s*(\d{1,4})\}")
 
 

@@ -8,8 +8,7 @@ from pathlib import Path
 from vibsim.core.home import home
 
 ADHOC = "adhoc"  # collection of a file outside the shipped ``configs/``
-SITE = "docs"
-"""Folder among the collections of the results, with the documentation built by ``make docs``."""
+SITE = "docs"  # folder among the collections of the results, with the documentation (``make docs``)
 ENDINGS = (".yaml", ".yml")  # endings of the names of experiment files
 
 

@@ -18,8 +18,7 @@ if TYPE_CHECKING:
 PLAIN_WORK = 40_000
 """Work of one scheme (`work`, times member-steps) up to which plain Python is faster than loading a compiled kernel."""
 PLAIN_SECONDS = 1.2e-6  # time of one member-step in plain Python [s]
-ONE_SECONDS = 12e-9
-"""Time of one compiled step of a single member [s], in which each operation waits for the previous one."""
+ONE_SECONDS = 12e-9  # time of one compiled step of one member [s]: operations wait for each other
 MANY_SECONDS = 3e-9  # time of one compiled member-step among many members [s]
 EVALUATION_WORK = 0.45
 """Work of each further force evaluation, in explicit steps with one. The remainder of such a step is independent of the
@@ -33,18 +32,14 @@ STRUCTURE_SECONDS = (35e-6, 12e-9)
 SECONDS_PER_BYTE = 4e-9  # time to produce, write, seal and flush one byte [s]
 JOB_SECONDS = 0.5  # overhead of a job [s]: process start, imports, loading kernels
 
-SUMMARY_BYTES = 160
-"""Bytes per scheme and member besides time series: extremes, peaks, periods, status."""
-D2T_BYTES = 8
-"""Further bytes per scheme and member if some scheme's velocity differs from the centred difference."""
-EXTREMUM_BYTES = 64
-"""Bytes of a peak and a trough: time and height, each from the parabola and from the grid."""
+SUMMARY_BYTES = 160  # bytes per scheme and member besides series: extremes, periods, status
+D2T_BYTES = 8  # further bytes per scheme and member if a velocity is not the centred difference
+EXTREMUM_BYTES = 64  # bytes of a peak and a trough: time and height, by parabola and on the grid
 EVENT_BYTES = 8  # bytes of an event: its time
 MEMBER_BYTES = 48  # bytes per member independent of the schemes: index, frequency, swept values
 FILE_BYTES = 33_000  # bytes of a file besides its data
 SERIES_FILE_BYTES = 11_000  # further bytes of a file that stores all series and extrema
-COORDINATE_BYTES = 14_000
-"""Further bytes of a file for each coordinate after the first: the headers of its variables."""
+COORDINATE_BYTES = 14_000  # further bytes of a file for each coordinate after the first: headers
 
 PACKED_UP_TO = 2**25
 """Largest file [bytes] that is held in memory and compressed, which takes a second; lean files never are."""
@@ -56,8 +51,7 @@ PAGE_BYTES = 600_000  # bytes of a report page with its figures and tables
 
 PLAIN_MEMORY = 68 * 10**6  # bytes of a simulate job without its arrays, in plain Python
 COMPILED_MEMORY = 120 * 10**6  # bytes of a simulate job without its arrays, with a compiled kernel
-ADAPTIVE_MEMORY = 160 * 10**6
-"""Further bytes of a simulate job with an adaptive scheme or a structure: SciPy and its data."""
+ADAPTIVE_MEMORY = 160 * 10**6  # further bytes of a simulate job that needs SciPy and its data
 STEP_BYTES = 64  # bytes that a job with SciPy holds per step of the level
 SCRATCH_BYTES = 520
 """Bytes that a job holds per scheme and member besides its series: the accumulators, and their stored form."""
@@ -69,19 +63,15 @@ LARGEST_SHARD = 2**20  # largest number of members of a shard
 
 ANALYSIS_MEMORY = 190 * 10**6
 """Bytes of an analysis without its arrays, including LLVM and the supervising process."""
-ANALYSIS_FACTOR = 3.8
-"""Peak memory of an analysis over the bytes that it reads for one block of members."""
-PART_SAMPLES = 2**16
-"""Samples of one variable in a block of an analysis: a few such arrays fit into the cache of a core."""
+ANALYSIS_FACTOR = 3.8  # peak memory of an analysis over the bytes read for one block of members
+PART_SAMPLES = 2**16  # samples of one variable in a block of an analysis, for the cache of a core
 PROCESS_MEMORY = 30 * 10**6  # bytes of each worker process of an analysis without its members
 RESULT_BYTES = 124  # bytes that an analysis keeps per scheme and member until its end
 
-ANALYSIS_BYTES = (140, 190)
-"""Bytes that an analysis writes per scheme and member: once, and per level; two norms, no series."""
+ANALYSIS_BYTES = (140, 190)  # bytes written per scheme and member: once, and per level; no series
 COMPARED_SERIES = (-48, 184)
 """Further bytes per scheme, member and sample, once and per level, if an analysis writes series."""
-COMPARED_NUMBERS = 785
-"""Further bytes per scheme and member: the limits of numbers (`vibsim.comparison.best_values`)."""
+COMPARED_NUMBERS = 785  # bytes per scheme and member: limits of numbers (`comparison.best_values`)
 COMPARED_FILE = 130_000  # bytes of the file of an analysis besides its data
 COMPARED_SERIES_FILE = 60_000  # further bytes of that file if an analysis writes series
 
@@ -118,17 +108,14 @@ class LevelCost:
     steps: int
     samples: int  # stored samples of each series
     series: int  # stored series per scheme and member
-    exact: int = 0
-    """Stored series per member independent of the schemes: the states of the exact solution."""
-    work: float = field(kw_only=True)
-    """Work of a step, summed over the explicit schemes (first number of `work`)."""
+    exact: int = 0  # stored series per member of all schemes: the exact solution
+    work: float = field(kw_only=True)  # of a step, over the explicit schemes (first of `work`)
     iterated: float = 0.0
     """Work of a step, summed over the implicit schemes (second number of `work`), which are not vectorised."""
     extrema: int = 0  # stored peaks (and as many troughs) per scheme and member
     events: int = 0  # stored event times per scheme and member
     d2t: bool = False  # whether the velocity of some scheme differs from the centred difference
-    scipy_seconds: float = 0.0
-    """Time of SciPy per member [s]: adaptive schemes, and the steps of a structure."""
+    scipy_seconds: float = 0.0  # SciPy per member [s]: adaptive schemes, steps of a structure
     shared: float = 0.0
     """The part of `scipy_seconds` that is spent once for all levels of a job: adaptive schemes run once [s]."""
     coordinates: int = 1

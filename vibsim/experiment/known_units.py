@@ -80,8 +80,7 @@ class Unit:
     """A unit in SI base units and radians."""
 
     factor: Fraction = Fraction(1)
-    powers: Mapping[str, int] = field(default_factory=dict)
-    """Nonzero exponents of the base units, by symbol."""
+    powers: Mapping[str, int] = field(default_factory=dict)  # nonzero exponents of base units
 
     @property
     def text(self) -> str:

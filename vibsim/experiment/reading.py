@@ -43,11 +43,9 @@ from vibsim.models.structure import STRUCTURE
 from vibsim.schemes import SCHEMES, Scheme
 
 SOLVER = "solver"  # key that only the files of `vibsim.experiment.solver_reading` have
-KEYS = (*Document.model_fields, SOLVER, "refine", "quantities")
-"""Top-level keys of both kinds of experiment file."""
+KEYS = (*Document.model_fields, SOLVER, "refine", "quantities")  # top-level keys of both kinds
 MAX_NAME = 100
-MAX_REPEATS = 20
-"""Snakemake takes a name that ends in this many repetitions for a rule that feeds itself."""
+MAX_REPEATS = 20  # Snakemake takes a name with so many at its end for a rule that feeds itself
 AS_WRITTEN = ("title", "source", "output", "tolerance", "published", "figures", "units")
 """Sections that are copied unchanged into the experiment."""
 SAME_START = 1e-12

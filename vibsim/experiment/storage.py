@@ -11,10 +11,8 @@ SMALL = 200_000
 """Largest number of samples of one variable for which ``samples: auto`` stores every step of a level."""
 LARGE = 2**17
 """Largest number of samples of one variable for which ``samples: auto`` stores all times of the coarsest level."""
-FEWEST_INTERVALS = 16
-"""Smallest number of sampling intervals to which ``samples: auto`` thins a member."""
-LEAN = 2**18
-"""Largest number of samples of one variable on the coarsest level of an experiment that is not lean."""
+FEWEST_INTERVALS = 16  # fewest sampling intervals to which ``samples: auto`` thins a member
+LEAN = 2**18  # samples of one variable on the coarsest level above which an experiment is lean
 MOST_EXTREMA = 512  # largest number of peaks, and of troughs, stored per scheme and member
 FEWEST_EXTREMA = 16  # number of extrema stored per scheme and member however many members there are
 MOST_REFERENCES = 1024  # largest number of members for which reference solutions are computed

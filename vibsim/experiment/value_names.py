@@ -53,21 +53,16 @@ class Value:
     """Whether it is defined at ``level: best``, as the limit of the numbers of all levels or for the extrapolated
     solution."""
     needs_time: bool = False  # whether ``t`` or ``step`` must be given
-    needs_exact: Literal["solution", "period"] | None = None
-    """Exact result that the model must provide."""
+    needs_exact: Literal["solution", "period"] | None = None  # exact result of the model
     needs_linear: bool = False  # whether it follows from theory for undamped linear models
     fixed_step: bool = False  # whether it is undefined for adaptive schemes
-    needs_potential: bool = False
-    """Whether it requires a known potential energy of all forces of the position."""
+    needs_potential: bool = False  # whether all forces of the position need a known potential
     needs_rational: bool = False
     """Whether the acceleration must be computable in rational arithmetic (`vibsim.theory.degrees`)."""
     needs_events: bool = False  # whether it exists only for models with events
-    needs_force: bool = False
-    """Whether it refers to whole periods of a force, whose frequency ``time:`` names."""
-    is_sample: bool = False
-    """Whether it is a sample of a series, and is reported under the name of the series."""
-    is_count_of_work: bool = False
-    """Whether it measures work, which grows with the level and does not converge."""
+    needs_force: bool = False  # whether it refers to periods of a force that ``time:`` names
+    is_sample: bool = False  # whether it is a sample of a series, and has the name of that
+    is_count_of_work: bool = False  # whether it measures work, which grows with the level
     survives_failure: bool = False
     """Whether it can be valid although the run failed later. Values from theory do not depend on the run."""
     measured_by: Literal["", "parabola", "points", "roots"] = ""

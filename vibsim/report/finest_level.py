@@ -42,8 +42,7 @@ class Error:
     true: Floats  # against the exact solution; NaN without one
     estimate: Floats
     low: Floats
-    high: Floats
-    """Estimates with the ends of the interval of the order; NaN if no interval is stated."""
+    high: Floats  # estimates with the ends of the interval of the order; NaN without one
 
     @property
     def kind(self) -> str:

@@ -106,8 +106,7 @@ class Grid:
     borders: tuple[Floats, Floats]  # of the cells along x and y
     cell: NDArray[np.intp]  # flat index of every member's cell in the table (y, x), shape (case,)
     note: str = ""  # what a cell shows, if it holds more than one member
-    separatrix: tuple[Floats, Floats] = (np.empty(0), np.empty(0))
-    """Points (x, y) where the exact period is infinite."""
+    separatrix: tuple[Floats, Floats] = (np.empty(0), np.empty(0))  # infinite exact period
 
     def worst(self, values: NDArray[Any], badness: NDArray[Any] | None = None) -> Floats:
         """Return the value of the worst member of every cell, shape (y, x): the one of largest `badness`.
@@ -125,10 +124,8 @@ class Grid:
         return table
 
 
-FEWEST_VALUES = 8
-"""Values of a key from which a response over it is telling; with fewer the motion of a member tells more."""
-FEWEST_OF_A_LINE = 5
-"""Swept values from which a curve may join members; between fewer it would invent a course."""
+FEWEST_VALUES = 8  # values of a key from which a response over it tells more than one motion
+FEWEST_OF_A_LINE = 5  # fewest swept values whose members a curve may join; else it invents a course
 
 
 def grid_of(keys: list[Key]) -> Grid | None:

@@ -18,8 +18,7 @@ from vibsim.plan.digests import analysed
 from vibsim.store import read_json
 
 _DIGITS = 6
-_RESULTS = ("summary.json", "convergence.nc", "report.html")
-"""A user may name a results folder by one of these files in it."""
+_RESULTS = ("summary.json", "convergence.nc", "report.html")  # each may name its results folder
 
 
 class Side(NamedTuple):

@@ -21,8 +21,7 @@ from vibsim.store import write_bytes, write_text
 if TYPE_CHECKING:
     from vibsim.models import Model
 
-SCHEMA = "vibsim.schema.json"
-"""Name of the schema that is written beside an experiment file outside of the checkout."""
+SCHEMA = "vibsim.schema.json"  # name of the schema beside a file outside of the checkout
 _NAME = re.compile("[a-z0-9_]+")
 EDITOR = "# yaml-language-server: $schema="
 """Start of the line with the path of the JSON Schema, for editors that complete keys and mark faults."""

@@ -22,8 +22,7 @@ if TYPE_CHECKING:
     from vibsim.schemes.base import Stepper
     from vibsim.theory.operators import Equation, Term
 
-_LONGEST = 10**6
-"""Fractions with larger numerators or denominators are written as decimals, as are roots."""
+_LONGEST = 10**6  # fractions of larger numbers are written as decimals, as are roots
 _DIGITS, _PRECISE = 8, 40  # digits of decimals in the output, and in the computation
 
 

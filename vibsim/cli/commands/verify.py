@@ -26,11 +26,9 @@ from vibsim.core.temporary import temporary_folder
 from vibsim.experiment.collection import SITE
 from vibsim.plan import Plan, choose
 
-NO_RESULTS = ("logs", "benchmarks")
-"""Folders of an experiment that hold the logs and times of its jobs, and no results."""
+NO_RESULTS = ("logs", "benchmarks")  # folders with the logs and times of jobs, and no results
 TIMESTAMP = ".snakemake_timestamp"  # file that Snakemake puts into a folder that a job made
-LAST = ("convergence.nc", "summary.json", "report.html")
-"""Files that every experiment has when its run ends."""
+LAST = ("convergence.nc", "summary.json", "report.html")  # files of every run that ended
 _MANIFEST = re.compile(r"\w+\.\w+", re.ASCII)
 """Name of the manifest of an experiment: collection and name, neither of which contains a dot."""
 SHOWN = 8  # most files that are listed by name for the same cause

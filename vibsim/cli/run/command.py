@@ -23,8 +23,7 @@ from vibsim.core.errors import FileError, VibsimError
 from vibsim.core.temporary import temporary_folder
 from vibsim.plan import Plan
 
-_STAGES = 4
-"""Most starts of the workflow: one, and one more for each kind of file that may prove damaged or stale."""
+_STAGES = 4  # most starts of the workflow: one, and one for each kind of file that may prove bad
 _PAGES = 5  # most experiments for which the path of each report is printed
 _NAMED = 5  # most experiments that run again for the same reason and are still listed by name
 

@@ -20,10 +20,8 @@ from vibsim.plan import Plan
 from vibsim.plan.workflow_names import GROUP, group_size
 
 PLUG_IN = "snakemake_executor_plugin_"
-PROFILES = ("config.yaml", "config.v8+.yaml", "config.v9+.yaml")
-"""Possible names of the file of a profile."""
-SHIPPED = ("slurm", "generic")
-"""The profiles in ``workflow/profiles``: one for SLURM, and one for any other executor."""
+PROFILES = ("config.yaml", "config.v8+.yaml", "config.v9+.yaml")  # names of the file of a profile
+SHIPPED = ("slurm", "generic")  # in ``workflow/profiles``: for SLURM, and for any other executor
 CONFIGURED = ("cores", "overhead", "here")
 """Settings of vibsim in a profile: cores of a job, memory of the executor's own processes [MB], and the total time of
 analyses and pages up to which they run here and not as jobs [s]."""
@@ -34,12 +32,9 @@ class Executor:
     """Options of Snakemake that say where jobs run."""
 
     arguments: Sequence[str]
-    config: Mapping[str, int] = field(default_factory=dict)
-    """Settings for `vibsim.cli.workflow.names_of` (`CONFIGURED`)."""
-    is_remote: bool = False
-    """Whether jobs run outside of this command's processes, so that an interrupt must cancel them."""
-    is_extended: bool = False
-    """Whether options of the user's own are among the arguments, which may name plug-ins."""
+    config: Mapping[str, int] = field(default_factory=dict)  # for `vibsim.cli.workflow.names_of`
+    is_remote: bool = False  # whether jobs run elsewhere, so that an interrupt must cancel them
+    is_extended: bool = False  # whether arguments are the user's own, and may name plug-ins
 
 
 def chosen(options: Namespace, plans: Sequence[Plan], results: Path) -> Executor:

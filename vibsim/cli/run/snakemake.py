@@ -124,8 +124,7 @@ class Outcome:
     """What Snakemake did, and how it ended."""
 
     status: int = 0
-    jobs: list[Job] = field(default_factory=list)
-    """Jobs that Snakemake started, or would start in a dry run."""
+    jobs: list[Job] = field(default_factory=list)  # those that it started, or would start
     failed: list[Job] = field(default_factory=list)
     exception: str = ""  # name of the last exception that Snakemake logged; empty without one
     message: str = ""  # the message of that exception, with several lines

@@ -16,8 +16,7 @@ from vibsim.experiment.sweep_columns import Column, grid_columns, matching, memb
 from vibsim.experiment.value_names import Value
 from vibsim.experiment.yaml.parse import Path_
 
-FEWEST_IN_A_PERIOD = 8
-"""Smallest number of stored samples per period of a force from which its harmonic is computed."""
+FEWEST_IN_A_PERIOD = 8  # fewest samples per period of a force for its harmonic
 
 
 @dataclass(frozen=True)

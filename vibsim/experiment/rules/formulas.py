@@ -56,10 +56,8 @@ class FormulaReader:
     model: Model
     report: Report
     texts: dict[str, str] = field(default_factory=dict)  # formulas by key
-    coefficients: dict[str, float] = field(default_factory=dict)
-    """Coefficients of terms given by a word, by key."""
-    tables: dict[str, TableSpec] = field(default_factory=dict)
-    """Tables that replace formulas, with the same keys."""
+    coefficients: dict[str, float] = field(default_factory=dict)  # of terms given by a word
+    tables: dict[str, TableSpec] = field(default_factory=dict)  # those that replace formulas
 
     @cached_property
     def declared(self) -> dict[str, float]:

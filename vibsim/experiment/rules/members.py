@@ -38,13 +38,10 @@ from vibsim.models.shared.inertia import MASS, inertia
 from vibsim.models.table import Lookup
 
 CHUNK = 2**16  # members per block
-SLACK = 1e-6
-"""Tolerance for rounding when abscissae are compared, in spacings of the table or in steps."""
+SLACK = 1e-6  # tolerance for rounding of compared abscissae, in spacings of the table or steps
 MOST_NAMED = 3  # largest number of swept values that identify a member in a message
-SAMPLED_MEMBERS = 64
-"""Number of members, evenly spaced, that are checked for jumps: hardly ever do only a few members jump."""
-WORK = 2**10
-"""Bound on operations times members in that check: for a long formula, fewer members are checked."""
+SAMPLED_MEMBERS = 64  # evenly spaced members that are checked for jumps: seldom do only a few jump
+WORK = 2**10  # bound on operations times members in that check: long formulas have fewer members
 WORDS = {1: "derivative", 2: "second derivative"}
 HINTS = {
     "voltage": "write a steep ramp, V0*(1 + tanh((t - t1)/0.001))/2 say, or begin behind the jump, "

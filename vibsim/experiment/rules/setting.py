@@ -22,10 +22,8 @@ class Setting:
     sweep: Sweep  # the sweep, with only its valid axes
     samples: int | str
     knows_sweep: bool = True  # whether all axes of the sweep are valid
-    by_tolerance: bool = False
-    """Whether a tolerance will choose the levels, so that checks cannot name them."""
-    knows_schemes: bool = True
-    """Whether the kind of every scheme is known; an unknown one may be of any kind."""
+    by_tolerance: bool = False  # whether a tolerance chooses the levels, which no check can name
+    knows_schemes: bool = True  # whether every kind of scheme is known; else it may be any
 
     def steps(self, level: int) -> int:
         """Return the number of steps at `level`, with 1 base step if the time is not known."""

@@ -14,8 +14,7 @@ MAX_MEMORY = 8 * 2**30
 MAX_DISK = 2**40  # bytes of the files of all levels
 MAX_FILES = 10_000
 """Files of all levels. With more of them the overhead of the workflow dominates."""
-MIN_DT = 1e-100
-"""Smallest time step: its square, and quotients by that, must stay within the range of floats."""
+MIN_DT = 1e-100  # smallest time step: its square, and quotients by that, must be floats
 
 
 def check(setting: Setting, report: Report) -> None:

@@ -30,8 +30,7 @@ from vibsim.experiment.schema.sweep import (
 from vibsim.experiment.yaml.parse import Path_
 from vibsim.models import Model
 
-MAX_HYPERCUBE = 10**6
-"""Largest number of points of a Latin hypercube, which must be drawn as a whole."""
+MAX_HYPERCUBE = 10**6  # largest number of points of a Latin hypercube, which is drawn whole
 MAX_RANGE = 2.0**53  # largest number of values of a range: larger indices are not exact as floats
 _STEPS = "step counts cannot be swept: every member has the same steps"
 _FIXED = {

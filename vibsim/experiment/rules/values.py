@@ -13,8 +13,7 @@ from vibsim.models import BUDGET, centred, has_budget, has_solution
 from vibsim.models.base import Model, error_parts
 from vibsim.models.structure import MOST_MODES
 
-ENERGIES = ("energy", "energy_deviation")
-"""The energies that are known exactly if energy is conserved."""
+ENERGIES = ("energy", "energy_deviation")  # known exactly if energy is conserved
 
 
 def value_named(name: str, scope: Scope) -> Value | None:

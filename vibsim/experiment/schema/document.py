@@ -42,8 +42,7 @@ from vibsim.models import MODELS, Model
 from vibsim.models.shared.crossings import MOST_EVENTS
 from vibsim.schemes import SCHEMES, Scheme
 
-OF_KIND = object()
-"""Marks a value whose section depends on its key ``kind``: the model, or an entry of ``schemes``."""
+OF_KIND = object()  # marks a value whose section depends on its key ``kind``: model, schemes
 
 
 def section_of_kind(section: str | int, raw: Any, kinds: Kinds) -> type[Section] | None:

@@ -34,12 +34,10 @@ IDENTIFIER = r"^[a-z0-9_]+$"
 _CONTROL = re.compile("[\x00-\x08\x0b\x0c\x0e-\x1f\x7f-\x9f\ud800-\udfff\ufffe\uffff]")
 _COMMA = re.compile(r"[-+]?\d+,\d+")
 MAX_LEVEL = 40
-STAND_IN = "?"
-"""Placeholder for faulty text that cannot be left out; no further fault is reported for it."""
+STAND_IN = "?"  # placeholder for faulty text that cannot be left out; has no further fault
 MAX_FORMULAS = 1000  # largest number of formulas in one list
 MAX_ENTRIES = 1000  # largest number of schemes or checks of one experiment
-DECLARED = "parameters"
-"""Key of the section ``model`` under which a file declares parameters for its formulas."""
+DECLARED = "parameters"  # key of the section ``model`` with the parameters of formulas
 TABLE = "table"  # key of the path of a table
 AT = "at"  # key of the abscissa, as a function of time, at which a table is evaluated
 FORMULA_NOTE = "a number, or a constant formula such as 2*pi/30"

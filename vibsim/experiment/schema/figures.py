@@ -15,8 +15,7 @@ Shows = Literal[
     "differences", "energy_error", "grids", "spring", "spectrum", "poincare", "player",
 ]  # fmt: skip
 KINDS: tuple[str, ...] = get_args(Shows)
-OVER_TIME = ("quantities", "panels", "each", "until", "beside")
-"""Keys that only `over_time` accepts."""
+OVER_TIME = ("quantities", "panels", "each", "until", "beside")  # keys of `over_time` alone
 LEVEL, MEMBER = "level", "member"  # values of `panels` and `each` besides swept keys
 
 

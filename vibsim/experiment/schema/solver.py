@@ -32,8 +32,7 @@ from vibsim.experiment.schema.sweep import ParameterSweep
 Kind = Literal["command", "python", "files"]
 KINDS: tuple[Kind, ...] = get_args(Kind)  # kinds of solvers, each a key of the section ``solver``
 PLACE = "output"  # placeholder of the file that a command writes
-RESERVED = (PLACE, "level", "levels", "threads", "case")
-"""Names that no size, parameter or quantity may have."""
+RESERVED = (PLACE, "level", "levels", "threads", "case")  # names that nothing else may have
 MOST_LEVELS = 100
 
 

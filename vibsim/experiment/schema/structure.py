@@ -18,8 +18,7 @@ from vibsim.experiment.schema.fields import (
 )
 from vibsim.models.structure import MOST_OBSERVED
 
-MOST_ROWS = 128
-"""Largest number of rows of a matrix in the experiment file; larger matrices come from files."""
+MOST_ROWS = 128  # largest number of rows of a matrix in the file; larger ones come from files
 Row = Annotated[tuple[Number, ...], Field(min_length=1), short(MOST_ROWS)]
 
 

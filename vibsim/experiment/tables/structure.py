@@ -22,8 +22,7 @@ from vibsim.models.structure import HISTORY, LOAD, MOST_DOFS, MOST_MODES, MOST_O
 MATRICES = ("mass", "stiffness", "damping")
 STARTS = ("start.displacement", "start.velocity")
 SYMMETRIC = 1e-12  # tolerance of symmetry, relative to the largest entry: files are rounded
-SAME_FREQUENCY = 1e-9
-"""Relative tolerance of multiple frequencies, whose shapes an eigensolver may mix arbitrarily."""
+SAME_FREQUENCY = 1e-9  # relative tolerance of multiple frequencies, whose shapes may be mixed
 FLAT = 1e-9  # smallest observed displacement that can scale a mode, relative to its largest entry
 
 
@@ -36,8 +35,7 @@ class Assembly:
     faults: list[tuple[str, str, str]] = field(default_factory=list)
     """Dotted key in the section ``model``, broken rule, and hint."""
     structure: Structure | None = None
-    unnamed: int = 0
-    """Number of degrees of freedom, if it is too large to observe all of them; else 0."""
+    unnamed: int = 0  # degrees of freedom, if too many to observe all of them; else 0
     digests: dict[str, tuple[str, str]] = field(default_factory=dict)
     """SHA-256 of the numbers of each array, and of the bytes of its file (empty without a file), by key."""
 

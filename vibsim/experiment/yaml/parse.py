@@ -31,8 +31,7 @@ Path_ = tuple[str | int, ...]  # path of a value: keys and list positions from t
 _NOT_PRINTABLE = re.compile("[^\t\n\r\x20-\x7e\x85\xa0-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]")
 """Characters that YAML 1.2.2, section 5.1, does not allow."""
 
-MAX_DIGITS = 1000
-"""Integers with more digits are read as floats, i.e. as infinity, which is then refused."""
+MAX_DIGITS = 1000  # integers with more digits are read as floats: as infinity, which is refused
 
 _NULL = frozenset({"", "~", "null", "Null", "NULL"})
 _TRUE = frozenset({"true", "True", "TRUE"})
@@ -61,8 +60,7 @@ class Node:
     is_open: bool = False
     keys: dict[Any, int] | None = None  # line of every key of a mapping
     children: dict[Any, Node] | None = None
-    setting: str = ""
-    """The command-line setting that the node and all nodes in it come from; empty if they are in the file."""
+    setting: str = ""  # the command-line setting that it comes from; empty if it is in the file
 
 
 @dataclass(frozen=True)

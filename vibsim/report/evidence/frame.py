@@ -14,8 +14,7 @@ from vibsim.report.types import Axes, Figure
 
 INK, SOFT, BAND = "#1b1b1b", "#555555", "#e4e4e4"
 COLOUR, SECOND = style.COLOURS[0], style.COLOURS[1]
-LEFT, RIGHT, ABOVE, BELOW, HEIGHT = 0.6, 0.35, 0.2, 0.38, 1.0
-"""Room around a panel, and its height [inch]."""
+LEFT, RIGHT, ABOVE, BELOW, HEIGHT = 0.6, 0.35, 0.2, 0.38, 1.0  # room around a panel, height [inch]
 WIDE = 3.3  # width of a panel over time [inch]
 SIZE = 8.0  # of the font [point]
 MOST_LEVELS = 12  # levels up to which all have a label

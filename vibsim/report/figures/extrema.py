@@ -24,8 +24,7 @@ MOST_MARKERS = 40  # numbers of one curve up to which each has a marker
 MARKED = 60  # the same of local frequencies
 MOSTLY = 0.5
 """If less than this fraction of the curves stays below `CUT_OFF` for two peaks, the scale is logarithmic."""
-CUT_OFF = 10.0
-"""Amplitudes and periods beyond this multiple of the exact one are cut off, and the panel says so."""
+CUT_OFF = 10.0  # amplitudes and periods beyond this multiple of the exact one are cut off
 
 Run = tuple[str, Member, int]  # a curve: label, scheme and member, position of the level
 

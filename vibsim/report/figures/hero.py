@@ -27,8 +27,7 @@ from vibsim.report.sweep_layout import Along, Grid
 from vibsim.report.text import findings
 from vibsim.report.types import Axes
 
-LEFT, RIGHT, HEIGHT = 5.4, 3.9, 2.75
-"""Widths of the left and the right picture, and their height [inch]."""
+LEFT, RIGHT, HEIGHT = 5.4, 3.9, 2.75  # widths of the two pictures, and their height [inch]
 FEW = 300  # members up to which orders are dots; more are a histogram
 FEWEST_ERRORS = 2  # that a picture against the step needs
 MOST_SCHEMES = 6  # schemes that the right picture can tell apart

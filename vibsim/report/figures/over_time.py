@@ -25,8 +25,7 @@ from vibsim.report.types import Axes
 MOST = 6  # most panels of a figure, and most figures
 FEW = 90  # points of a run up to which each has a marker
 LEAVES_FRAME = 8.0  # values beyond this multiple of the exact solution leave the frame
-SEEN = 0.2
-"""Runs that stay within `LEAVES_FRAME` for a smaller fraction of the time are drawn whole instead."""
+SEEN = 0.2  # runs within `LEAVES_FRAME` for a smaller fraction of the time are drawn whole instead
 SUBTLE: dict[str, Any] = {"linestyle": (0, (5, 2)), "linewidth": 1.2, "zorder": 1.5}
 """The look of further curves."""
 

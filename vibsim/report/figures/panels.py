@@ -12,8 +12,7 @@ from vibsim.core.array_types import Floats
 from vibsim.report import data, frame, style
 from vibsim.report.types import Axes, Figure
 
-LOG_RATIO = 1e6
-"""Curves whose largest value exceeds this multiple of the median are drawn on a logarithmic scale."""
+LOG_RATIO = 1e6  # largest value over the median above which curves have a logarithmic scale
 STILL_GROWS = 0.9  # part of the time after which a largest value means that values still grow
 DEEPEST = (
     1e-12  # smallest part of the largest value on a logarithmic axis of values that do not grow

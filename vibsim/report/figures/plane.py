@@ -20,8 +20,7 @@ from vibsim.report.types import Axes
 
 PANELS_A_ROW = 3  # panels in a row of the phase plane, and most panels of the path
 MOST_PANELS = 6  # most panels of the phase plane, and most schemes in them
-CUT_ORBIT, CUT_PATH = 2.5, 1.3
-"""Frames hold at most this multiple of the size of the exact orbit, or of the first path."""
+CUT_ORBIT, CUT_PATH = 2.5, 1.3  # largest frame over the exact orbit, and over the first path
 PERIODS = 3.0  # of a longer motion the first period and this many last ones are drawn
 FEWEST_SAMPLES = 8  # fewest samples a period that draw an orbit
 FLATTEST = 0.15  # smallest ratio of the sides of a path's frame

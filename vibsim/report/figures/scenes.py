@@ -48,8 +48,7 @@ class Motion:
     t: Floats
     states: Mapping[str, Floats]
     parameters: Mapping[str, Any]
-    reach: Mapping[str, float]
-    """Largest size of each state over all motions that are drawn side by side."""
+    reach: Mapping[str, float]  # largest size of each state over all motions drawn side by side
 
     def number(self, name: str) -> float:
         """Return a parameter."""
@@ -86,8 +85,7 @@ class Part:
     vector), ``arc`` (centre, radius, angle from straight down [degree]), ``track`` (shift of a fixed outline to the
     left)."""
     look: str  # class of the style sheet
-    at: tuple[Floats | float, ...]
-    """The numbers of the shape, as series of shape (t,) or as constants."""
+    at: tuple[Floats | float, ...]  # numbers of the shape: series of shape (t,), or constants
     outline: str = ""  # path data of a track
     label: str = ""  # text beside an arrow or an arc
 

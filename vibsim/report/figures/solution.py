@@ -20,8 +20,7 @@ MOST = 6  # most levels that can be told apart
 Look = dict[str, Any]
 BEYOND = 3.0  # levels beyond this multiple of the reference solution leave the frame
 CUT = 3.0  # solutions beyond this multiple of the exact one are cut off, and the panel says so
-TINY = 1e-18
-"""Smallest relative size on a logarithmic panel; smaller values are accidents of rounding."""
+TINY = 1e-18  # smallest relative size on a logarithmic panel; smaller ones are rounding
 BAND = "#56B4E9"
 DOTS: Look = {"linestyle": "none", "marker": ".", "markersize": 3.0}
 """Replaces a line if the samples are too few for one."""

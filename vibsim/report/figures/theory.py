@@ -30,10 +30,8 @@ MOST_RUNS = 6  # most unstable runs that are drawn, from the slowest to the fast
 NOTABLE = 1e-3  # least growth per period, less one, of an unstable run that is drawn
 FULLY_DRAWN = 4.0  # limit of the linear scale over the size of the exact solution
 LARGEST_DRAWN = 1e250  # larger sizes are not drawn
-SEEN = 0.2
-"""Further runs join the linear panel only if they stay within it for this fraction of the time."""
-LEAVES_FRAME = 100.0
-"""Curves on the linear scale end at this multiple of the exact solution, outside the frame."""
+SEEN = 0.2  # further runs join the linear panel if they stay within it so much of the time
+LEAVES_FRAME = 100.0  # curves on the linear scale end at this multiple of the exact solution
 
 
 def order_and_stability(record: Results) -> Picture | None:

@@ -44,13 +44,11 @@ class Film:
     """The content of all frames."""
 
     runs: tuple[Run, ...]
-    scenes: tuple[Scene, ...]
-    """A drawing of each run at the times of the frames; empty if the system cannot be drawn."""
+    scenes: tuple[Scene, ...]  # a drawing of each run at these times; empty if there is none
     t: Floats  # time of every frame, shape (frame,)
     start: float  # first time shown
     stop: float  # last time shown
-    window: float
-    """Width of the window over the series: the whole time shown, or some periods of a long run."""
+    window: float  # width of the window over the series: the whole time, or some periods
     label: str  # label of the series, with its unit
     time_unit: str
     end: float  # last time requested; the movie may show only the beginning

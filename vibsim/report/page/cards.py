@@ -21,8 +21,7 @@ from vibsim.report.tables import published
 from vibsim.report.tables.table import Column, Table
 from vibsim.report.text import assertions, experiment_file, findings, reasons
 
-SAID_BY_THE_LINE = ("value", "equal", "converges")
-"""Kinds of checks whose line says everything if they pass."""
+SAID_BY_THE_LINE = ("value", "equal", "converges")  # kinds whose line says everything if passed
 ALIKE = 6  # value checks, or checks of equality, from which their lines become a table
 WIDE = 1.0  # an interval that extends further below its order gets a sentence
 

@@ -19,8 +19,7 @@ from vibsim.report.page import history, sources
 from vibsim.report.page.templates import digest_of, environment, source
 from vibsim.report.tables.table import Column, Table, to_csv
 
-UNREADABLE = ("DAMAGED", "MISSING")
-"""Statuses of an experiment whose verdict cannot be read; they count as failed."""
+UNREADABLE = ("DAMAGED", "MISSING")  # statuses without a readable verdict, which count as failed
 FILTERS = (
     ("PASS", "passed"),
     ("INCONCLUSIVE", "undecided"),
@@ -68,8 +67,7 @@ class Row:
     checks: Sequence[Mapping[str, Any]] = ()
     broken: int = 0  # number of runs that broke down
     headline: Headline = field(default_factory=Headline)
-    marks: Sequence[tuple[str, int]] = ()
-    """The `words.MARKS` of its checks, each with the number of checks."""
+    marks: Sequence[tuple[str, int]] = ()  # the `words.MARKS` of its checks, each with its number
 
     @property
     def key(self) -> str:

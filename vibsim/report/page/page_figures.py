@@ -18,8 +18,7 @@ BYTES = 1_000_000  # most bytes of all figures under tabs; further figures are f
 FIGURES = 6  # most figures under the tabs of a section
 
 Shown = tuple[Picture, str]  # a picture with its markup
-Sources = list[tuple[FigureOfSource, list[Picture]]]
-"""The figures of the source with their pictures."""
+Sources = list[tuple[FigureOfSource, list[Picture]]]  # figures of the source with their pictures
 
 
 def draw(

@@ -35,8 +35,7 @@ class Column:
 
     header: str
     unit: str = ""
-    form: str = "text"
-    """``text``, ``printed`` (see `words.printed`), or a form of `vibsim.report.words.number`."""
+    form: str = "text"  # ``text``, ``printed`` (see `words.printed`), or a form of `words.number`
 
     @property
     def title(self) -> str:
@@ -52,8 +51,7 @@ class Table:
     caption: str
     columns: tuple[Column, ...]
     rows: tuple[tuple[Cell, ...], ...]
-    heads: int = 0
-    """Number of long repeating columns at the left, which a page shows once, above each block of rows."""
+    heads: int = 0  # number of columns at the left that a page shows once, above each block of rows
 
     def __post_init__(self) -> None:
         if any(len(row) != len(self.columns) for row in self.rows):
@@ -89,8 +87,7 @@ class Table:
         return "small" if form == "norm" and needs_power else form
 
 
-Filled = tuple[Column, Callable[[Any], Cell]]
-"""A column, and the function that returns its cell for the object of a row."""
+Filled = tuple[Column, Callable[[Any], Cell]]  # a column, and what gives its cell for an object
 
 
 def keyed(key: str, unit: str = "", form: str = "text") -> Filled:

@@ -20,8 +20,7 @@ from vibsim.report.tables.table import Cell, Column, Table, Written
 
 LIMITS = {0.0: "never", math.inf: "any"}  # words for special limits of stability
 EDGE = 1e-9  # relative distance within which a step is at the limit of stability
-ROUNDINGS = 32.0
-"""Rounding errors per step of a period within which a prediction and a measurement agree."""
+ROUNDINGS = 32.0  # rounding errors per step within which a prediction and a measurement agree
 
 
 def predicted(record: Results) -> bool:

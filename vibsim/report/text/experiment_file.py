@@ -161,8 +161,7 @@ def _value(value: Any) -> str:
     return json.dumps(value)
 
 
-MOST_LEVELS = 6
-"""Most finer levels that are proposed; where more are needed, another problem is a better choice."""
+MOST_LEVELS = 6  # most finer levels that are proposed; else another problem is a better choice
 WINDOW = 3  # levels coarser than the finest readable one that show an order
 
 

@@ -77,8 +77,7 @@ IN_NUMBERS = {
     "equal": "They are {found}.",
 }
 """Kind of a failed check to its numbers, under a title that says what failed."""
-GROWN = 2.0
-"""Ratio of the finest error to the smallest one from which a page says that refinement does harm."""
+GROWN = 2.0  # ratio of the finest error to the smallest one from which refinement does harm
 NO_CHECK = "The motion was computed, and nothing was asked of it"
 CLAIMS = {
     ("PASS", False): "",

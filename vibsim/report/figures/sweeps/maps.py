@@ -24,8 +24,7 @@ LEFT, WIDE, TALL, ABOVE, BELOW = 0.8, 5.4, 3.4, 0.32, 0.5
 BAR = 0.14  # width of the colour bar, and half of the gap before it [inch]
 BORDERED = 400  # most cells that are drawn one by one, with borders; more are one image
 MOST_DECADES = 12.0  # of a logarithmic scale, from the largest value down
-LOG_SPREAD = 20.0
-"""Ratio of the largest value to the 1 % quantile above which a scale is logarithmic."""
+LOG_SPREAD = 20.0  # largest value over the 1 % quantile above which a scale is logarithmic
 LOG_SPREAD_OF_PERIODS = 5.0  # the same for periods: those of rotation are much shorter
 ORDER_RANGE = 0.5  # distance from the formal order at the ends of the colours
 DOT_SPACING = 0.025  # smallest distance of the dots of a separatrix, as a fraction of the panel
@@ -47,8 +46,7 @@ class Map:
     tolerance: float = 0.0
     spread: float = LOG_SPREAD
     codes: tuple[tuple[str, str], ...] = ()  # of kind ``code``: text and colour of every number
-    number: Floats | None = None
-    """The number itself, if the map shows its distance from another one."""
+    number: Floats | None = None  # the number, if the map shows its distance from another one
     shared: str | None = None
     """The sentence if all members share the value, else empty; None to derive it from the values."""
 

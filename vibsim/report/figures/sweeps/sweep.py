@@ -359,8 +359,7 @@ class _Curve:
     number: int  # of all curves
     x: Floats
     members: NDArray[np.intp]
-    text: str
-    """Legend entry: the scheme, if there are several, and the line; empty for a single curve."""
+    text: str  # legend entry: the scheme, if there are several, and the line; else empty
 
     def of(self, values: Floats) -> Floats:
         """Return the values of its members, of values of the shape (scheme, case)."""

@@ -33,8 +33,7 @@ class View:
     values: Floats | None = (
         None  # of `schemes`, shape (scheme, case); None for a verdict, which is shown anyway
     )
-    places: Floats | None = None
-    """Vertical positions of the members, of the same shape, if they differ from the values."""
+    places: Floats | None = None  # vertical positions of the members if they are not the values
     unit: str = ""
     schemes: tuple[int, ...] = ()  # those drawn
     of: str = ""  # the scheme, if each has its own view
