@@ -153,8 +153,7 @@ def _work(
         status = int(ended.code or 0)
     finally:
         os.write(end, b".")
-        # do not wait for other threads
-        os._exit(status)
+        os._exit(status)  # do not wait for other threads
 
 
 def _interrupt(number: int, _: object) -> None:
@@ -181,8 +180,7 @@ def _watch(worker: int, ends: set[signal.Signals]) -> tuple[int, int]:
             signalled, deadline = received, time.monotonic() + max(_GRACE, _grace[0])
             os.kill(worker, signal.SIGTERM)
         elif signalled and (received or time.monotonic() >= deadline):
-            # out of time, or a second signal
-            os.kill(worker, signal.SIGKILL)
+            os.kill(worker, signal.SIGKILL)  # out of time, or a second signal
 
 
 def _ended(worker: int) -> int | None:

@@ -19,6 +19,5 @@ def collection_of(file: Path, configs: Path | None = None) -> str:
     """
     if configs is None:
         configs = home() / "configs"
-    # Path.resolve raises an error for circular links
-    folder = Path(os.path.realpath(file)).parent
+    folder = Path(os.path.realpath(file)).parent  # Path.resolve raises an error for circular links
     return folder.name if folder.parent == configs.resolve() else ADHOC

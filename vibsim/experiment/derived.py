@@ -145,8 +145,7 @@ def with_levels(experiment: AnyExperiment, levels: Sequence[int]) -> AnyExperime
         sweep=experiment.sweep or Sweep(axes=()),
         samples=experiment.samples,
     )
-    # the check inside a claim gets its id from the claim again
-    without_id = {"id": ""}
+    without_id = {"id": ""}  # the check inside a claim gets its id from the claim again
     written = [
         check.model_copy(update={"that": check.that.model_copy(update=without_id)})
         if isinstance(check, ClaimCheck)

@@ -151,8 +151,7 @@ def _with_swept_key(check: Any, sweep: Any) -> Any:
         result["take"] = "where_largest"
     if check.get("over") == "cases":
         fixed = check["at"] if isinstance(check.get("at"), Mapping) else {}
-        # keys that vary together count as one
-        axes: dict[Path_, list[str]] = {}
+        axes: dict[Path_, list[str]] = {}  # keys that vary together count as one
         for path, _ in swept_values(sweep):
             axes.setdefault(path[:-1] if path[1] == "zip" else path, []).append(str(path[-1]))
         keys = [axis[0] for axis in axes.values() if fixed.keys().isdisjoint(axis)]

@@ -36,8 +36,7 @@ class _Quiet(Axis):  # type: ignore[misc, unused-ignore]
 
     def _get_tick(self, major: bool) -> Any:
         tick = super()._get_tick(major)  # type: ignore[misc, unused-ignore]
-        # keeps grid lines within the frame
-        tick.set_clip_path(self.axes.patch)
+        tick.set_clip_path(self.axes.patch)  # keeps grid lines within the frame
         return tick
 
     def get_tick_space(self) -> int:

@@ -269,8 +269,7 @@ class Results(Record):
         path = next((x for x in columns if x.dtype.kind == "f" and np.unique(x[:2]).size > 1), None)
         if path is None or np.all(same, axis=0).sum() < 2:
             return ""
-        # the first member goes where the next one goes
-        after = max(case, 1)
+        after = max(case, 1)  # the first member goes where the next one goes
         return f" on the way {'up' if path[after] > path[after - 1] else 'down'}"
 
     @property

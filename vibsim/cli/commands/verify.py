@@ -133,8 +133,7 @@ def _files(folder: Path, *, is_top: bool) -> Iterator[str]:
     for parent, folders, names in os.walk(folder):
         inner = Path(parent).relative_to(folder)
         if is_top:
-            # enter collections, but not experiments
-            outer = [] if inner.parts else folders
+            outer = [] if inner.parts else folders  # enter collections, but not experiments
             folders[:] = [name for name in outer if not name.startswith(".") and name != SITE]
         elif not inner.parts:
             folders[:] = [name for name in folders if name not in NO_RESULTS]

@@ -67,8 +67,7 @@ def _failed_job(job: Job, results: Path) -> Entry:
     tail = [line for line in lines if line.strip()][-_LOG_LINES:]
     tail += [job.reason] * bool(job.reason)
     tail += [f"log of the executor: {job.executor_log}"] * (results / job.executor_log).is_file()
-    # on a full disk, a job cannot write its log
-    tail = tail or [*resources.obstacle(results)]
+    tail = tail or [*resources.obstacle(results)]  # on a full disk, a job cannot write its log
     tail = tail or ["it left no message: it did not start, or was killed"]
     return {"job": str(job), "log": str(log), "tail": tail}
 

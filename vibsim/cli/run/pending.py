@@ -50,8 +50,7 @@ def reasons(results: Path) -> Counter[str]:
             command, capture_output=True, text=True, check=True, timeout=INTERVAL
         )
     except (OSError, subprocess.SubprocessError):
-        # the executor queries the scheduler too, and reports its errors
-        return Counter()
+        return Counter()  # the executor queries the scheduler too, and reports its errors
     lines = (line for line in ended.stdout.splitlines() if line.startswith(f"{results}/"))
     return Counter(line[-_REASON:].strip() for line in lines)
 

@@ -268,8 +268,7 @@ def _record(event: dict[str, Any], outcome: Outcome, progress: Progress | None) 
                 outcome.failed.append(job)
                 return
             if len(others) < len(outcome.failed):
-                # a failed job is tried again
-                outcome.failed = others
+                outcome.failed = others  # a failed job is tried again
                 return
             outcome.jobs.append(job)
             if progress:

@@ -235,8 +235,7 @@ def _jump(formula: Expression, members: MemberNumbers, along: Expression) -> flo
     for numbers, end in members.sampled(most):
         t = first_jump(formula, numbers, end)
         if t is not None:
-            # bisection ends next to 0, not at it
-            t = t if t > 1e-9 * end else 0.0
+            t = t if t > 1e-9 * end else 0.0  # bisection ends next to 0, not at it
             return float(values(along, {**numbers, "t": t}))
     return None
 

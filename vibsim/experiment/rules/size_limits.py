@@ -44,8 +44,7 @@ def check_costs(experiment: ExperimentSpec, report: Report) -> None:
     """Report if a job takes too much memory, or the levels too much disk or too many files."""
     costs = [level_cost(experiment, level) for level in experiment.levels]
     hint = "store fewer samples, or begin at a lower level"
-    # the smallest job makes one member, or one chain of members
-    smallest = experiment.chain
+    smallest = experiment.chain  # the smallest job makes one member, or one chain of members
     memory = max((cost.memory(smallest) for cost in costs), default=0)
     disk = sum(cost.disk(experiment.members) for cost in costs)
     files = [cost.shards(experiment.members) for cost in costs]

@@ -33,8 +33,7 @@ def read_structure(
         if any(section.model_fields_set - {"kind", DECLARED}):
             report.add(("model", "stiffness"), MISSING)
             return None, {}
-        # default: one mass on one spring
-        arrays["stiffness"] = ArraySpec(rows=((1.0,),))
+        arrays["stiffness"] = ArraySpec(rows=((1.0,),))  # default: one mass on one spring
     observed = _observed(section, report)
     named = {name: row[0][0] for name, row in observed if [factor for _, factor in row] == [1.0]}
     formulas = _loads(section, named, arrays, report)

@@ -168,8 +168,7 @@ class SweepReader:
             self.report.add(path, f"must be a list of {what}", hint)
             return None
         path = (*path, next(iter(type(written).model_fields)))
-        # all values of a rule lie between its ends
-        is_sound = self._gives_values(written, path)
+        is_sound = self._gives_values(written, path)  # all values of a rule lie between its ends
         return written if is_sound and self._entries(written.ends, kind, path) else None
 
     def _type(self, key: str, path: Path_) -> Any:

@@ -172,8 +172,7 @@ def _warn_repeated(report: Report) -> None:
     """Warn about a repeated value in the list of a swept key: equal members, or a decimal comma."""
     section = report.source.data.get("sweep")
     if not isinstance(section, Mapping) or "follow" in section:
-        # with `follow`, members with equal values differ in their start
-        return
+        return  # with `follow`, members with equal values differ in their start
     for key, values in section.items():
         listed = values if isinstance(values, list) else []
         numbers = Counter(x for x in listed if type(x) in (int, float))
@@ -214,8 +213,7 @@ def _warn_digits(path: Path_, name: str, number: float, report: Report) -> None:
     try:
         digits = Decimal(text).as_tuple()
     except ArithmeticError:
-        # a formula is exact
-        return
+        return  # a formula is exact
     assert isinstance(digits.exponent, int)
     if len(digits.digits) < EXACT_DIGITS:
         half = Decimal(5).scaleb(digits.exponent - 1)

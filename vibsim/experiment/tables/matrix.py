@@ -55,8 +55,7 @@ def _from_matrix_market(content: bytes) -> Any:
         rows, columns, _, form, field, _ = mminfo(io.BytesIO(content))
         if field == "pattern":
             raise TableError("holds only the pattern of the matrix, without numbers")
-        # before anything of that size is allocated
-        _check_counts(rows, columns)
+        _check_counts(rows, columns)  # before anything of that size is allocated
         if form == "array" and rows * columns > MOST_DENSE**2:
             raise TableError(
                 f"a matrix of more than {MOST_DENSE} rows must be in coordinate format"

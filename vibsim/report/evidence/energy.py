@@ -64,8 +64,7 @@ def picture(checked: CheckedLadder, check: ConservesCheck) -> Picture | None:
     experiment = record.experiment
     options = options_of(experiment, recorded_columns(record), *member.place)
     if not experiment.schemes[member.scheme].method.has_own_end(record.model, options):
-        # the verdict leaves out a velocity with a formula of its own
-        running[-1] = np.nan
+        running[-1] = np.nan  # the verdict leaves out a velocity with a formula of its own
     error = EnergyError(
         kind=DRIFTS[int(kind)],
         expected=check.drift,

@@ -40,8 +40,7 @@ def picture(checked: CheckedLadder, check: EqualCheck) -> Picture | None:
     frame.scale(ax, typical, np.array([bound, 0.1 * typical.max()]), is_log=True, margin=0.12)
     if 0.0 < bound < math.inf:
         frame.below(ax, bound)
-    # zeros are drawn at the lower edge
-    lowest = ax.get_ylim()[0]
+    lowest = ax.get_ylim()[0]  # zeros are drawn at the lower edge
     look: dict[str, Any] = {"color": frame.COLOUR, "linewidth": 0.9, "label": "difference"}
     ax.plot(t, np.where(distance == 0.0, lowest, distance), **look)
     i = int(np.nanargmax(np.where(np.isfinite(distance), distance, np.nan)))

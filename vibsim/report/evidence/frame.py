@@ -71,8 +71,7 @@ def scale(ax: Axes, *shown: Floats, is_log: bool = False, margin: float = 0.15) 
     ax.set_ylim(low, high)
     round_ticks(ax.yaxis)
     if words.number(low, "step") == words.number(high, "step"):
-        # several ticks would have the same label
-        ax.set_yticks([0.5 * (low + high)])
+        ax.set_yticks([0.5 * (low + high)])  # several ticks would have the same label
 
 
 def allowed(ax: Axes, low: float, high: float) -> None:

@@ -31,8 +31,7 @@ def picture(checked: CheckedLadder, check: ValueCheck) -> Picture | None:
     None if no level has it, or all have the number expected.
     """
     if check.take not in OF_ONE_MEMBER:
-        # the check is not on a number of a single member
-        return None
+        return None  # the check is not on a number of a single member
     by_level = _values(checked, check)
     if by_level is None or not np.isfinite(by_level[0]).any():
         return None
@@ -44,8 +43,7 @@ def picture(checked: CheckedLadder, check: ValueCheck) -> Picture | None:
     if not np.isfinite(values[row.counts]).any():
         return None
     if values.size > 1 and np.all(values == check.equals):
-        # a picture of the same number on every level says no more than the number
-        return None
+        return None  # a picture of the same number on every level says no more than the number
     bar = values[-1] + np.array([-row.bound, row.bound])
     if check.equals is None:
         return _beside_border(row, check, title, bar)

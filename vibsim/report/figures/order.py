@@ -79,8 +79,7 @@ def _draw_norms(ax: Axes, ladders: list[Ladder]) -> set[str]:
     kinds: dict[str, list[Floats]] = {"difference": [], "true": [], "floor": []}
     for ladder in ladders:
         if np.isnan(ladder.formal_order):
-            # an adaptive scheme has no error against dt
-            continue
+            continue  # an adaptive scheme has no error against dt
         look, name = style.look(ladder.scheme), style.entry(ladder.member.scheme_name)
         norms = ladder.at("difference_norm"), ladder.at("error_norm"), ladder.floor()
         difference, true, floor = map(style.no_zeros, norms)
@@ -199,8 +198,7 @@ def _draw_by_level(ax: Axes, ladders: list[Ladder]) -> bool:
     are_sound = [ladder.sound_triples for ladder in ladders]
     for ladder, above in zip(ladders, are_sound, strict=True):
         if any(map(any, are_sound)) and not any(above):
-            # orders of noise could be mistaken for orders
-            continue
+            continue  # orders of noise could be mistaken for orders
         look, local = style.look(ladder.scheme), ladder.at("observed_order")
         sound.append(local[above] if any(above) else local)
         ax.plot(triples, local, **look, markersize=5, linewidth=1.1)

@@ -70,8 +70,7 @@ def phase(record: Results, shown: list[Member]) -> Picture | None:
         ax.set_title(f"level {levels[i]}, w dt = {words.number(w * float(dt[i]), 'step')}")
     edge = 1.12 * (min(largest, CUT_ORBIT * size) if size > 0.0 else largest)
     if edge == 0.0:
-        # at rest
-        return None
+        return None  # at rest
     letter, measure = words.symbol(model.position), record.unit(f"{model.position}_finest")
     for n, ax in enumerate(axes):
         ax.set(xlim=(-edge, edge), ylim=(-edge, edge), aspect="equal")

@@ -101,8 +101,7 @@ def poincare(record: Results, shown: list[Member]) -> Picture | None:
     states = [Ladder(record, name, first[0]) for name in (model.position, model.velocity)]
     n, rest = divmod(len(record["t"]) - 1, round(periods))
     if rest or not n:
-        # samples that are thinned do not show every period
-        return None
+        return None  # samples that are thinned do not show every period
     drawn = []
     for ax, member in zip(axes, first, strict=True):
         u, v = (state.with_member(member).finest for state in states)

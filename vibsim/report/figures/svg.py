@@ -144,8 +144,7 @@ class Writer(RendererBase):  # type: ignore[misc, unused-ignore]
             x, y = (" ".join(f"{v:.9g}" for v in lim) for lim in (ax.get_xlim(), ax.get_ylim()))
             kind, _, window = tag.partition(" ")
             more = f' data-window="{window}"' if window else ""
-            # pages enlarge a panel with a window
-            self._decimals = 3 if window else 2
+            self._decimals = 3 if window else 2  # pages enlarge a panel with a window
             self._body.append(
                 f'<g data-axis="{kind}"{more} data-box="{place}" data-x="{x}" data-y="{y}" data-log="{log}">'
             )

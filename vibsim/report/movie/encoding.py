@@ -81,8 +81,7 @@ def _gif(frames: Iterator[Pixels], fps: float) -> bytes:
             yield Image.fromarray(frame).quantize(palette=palette, dither=Image.Dither.NONE)
 
     stream = io.BytesIO()
-    # in whole hundredths of a second
-    duration = max(20, 10 * round(100.0 / fps))
+    duration = max(20, 10 * round(100.0 / fps))  # in whole hundredths of a second
     images = reduced()
     next(images).save(
         stream, format="gif", save_all=True, append_images=images, duration=duration, loop=0

@@ -88,8 +88,7 @@ def statements(
     found: dict[tuple[str, str, str], list[Statement]] = {}
     for name, link, checks in experiments:
         for check in checks:
-            # summaries of older versions have no source
-            source = check.get("source")
+            source = check.get("source")  # summaries of older versions have no source
             if check["kind"] == "claim" and source and any(source[p] for p in citation.PLACES):
                 for place in _places(source):
                     found.setdefault(place, []).append(_statement(check, source, name, link))

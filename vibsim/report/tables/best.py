@@ -86,8 +86,7 @@ def _rows(
             if not math.isfinite(value):
                 continue
             if row.value in OF_A_PERIODIC_MOTION and abs(value) <= bound:
-                # its levels do not tell whether there is a period at all
-                continue
+                continue  # its levels do not tell whether there is a period at all
             index = float(record.at(f"{name}_gci", member)) if has_series else math.nan
             yield (
                 title,

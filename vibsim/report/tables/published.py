@@ -104,8 +104,7 @@ def _row(
     steps = dict(zip(levels, record.dt(case).tolist(), strict=True))
     yield row.scheme
     yield str(level)
-    # the extrapolated solution has no step
-    yield steps.get(level, math.nan)
+    yield steps.get(level, math.nan)  # the extrapolated solution has no step
     yield from (getattr(row.at, key) for key in PLACES if key in headers)
     yield from (row.at.swept.get(header) for header in headers if "." in header)
     yield row.printed

@@ -175,8 +175,7 @@ def _check_title(lead: CheckedLadder) -> str:
         # the outcome of a trap says more than that it was expected
         word = str(lead.result["reason"] if reason == "match" else reason)
         if word == "exact" and any(result["reason"] != "exact" for result in lead.entry["results"]):
-            # some schemes are exact, as they promise; the others have an order
-            word = "asymptotic"
+            word = "asymptotic"  # some schemes are exact, as they promise; the others have an order
         return ON_ORDER.get(word, ON_ORDER["mismatch"]).format_map(filled)
     if reason == "non_finite":
         return ON_ORDER["non_finite"].format_map(filled)
@@ -345,8 +344,7 @@ def paragraph(lead: CheckedLadder) -> str:
     if lead.is_refutation and lead.reason == "match":
         return reasons.REFUTED
     if lead.kind == "value" and lead.reason == "match":
-        # the number stands above, with what is asked for
-        return ""
+        return ""  # the number stands above, with what is asked for
     word = lead.result.get("reason") if lead.is_on_order else lead.reason
     if word == "mismatch" and lead.kind in KINDS:
         # what was found says more than that it is not as expected

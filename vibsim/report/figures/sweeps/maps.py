@@ -311,8 +311,7 @@ def _legend(ax: Axes, shown: Map) -> None:
 
     edge: Any = {"edgecolor": "#404040", "linewidth": 0.4}
     handles = [Patch(facecolor=colour, label=text, **edge) for text, colour in shown.codes]
-    # the worst on top
-    ax.legend(handles=handles[::-1], **style.BESIDE, handlelength=1.2)
+    ax.legend(handles=handles[::-1], **style.BESIDE, handlelength=1.2)  # the worst on top
 
 
 def _scale(ax: Axes, image: Any, shown: Map, table: Floats) -> None:
