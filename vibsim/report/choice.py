@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
@@ -131,18 +131,18 @@ def with_levels(record: Results, candidates: list[Member]) -> list[Member]:
 class CheckedLadder(Ladder):
     """The ladder of the decisive result of a check, with the check; without a check that of the position."""
 
-    entry: Mapping[str, Any] | None = None  # the check in the summary
+    entry: Mapping[str, Any] = field(default_factory=dict)  # the check in the summary, if any
     asserted: Check | None = None  # the check in the experiment; None if the tolerance decides
 
     @property
     def status(self) -> str:
         """The status of the check; empty without one."""
-        return "" if self.entry is None else self.entry["status"]
+        return str(self.entry.get("status", ""))
 
     @property
     def reason(self) -> str | None:
         """The reason of the status."""
-        return None if self.entry is None else self.entry["reason"]
+        return self.entry.get("reason")
 
     @property
     def is_refutation(self) -> bool:
@@ -173,12 +173,12 @@ class CheckedLadder(Ladder):
     @property
     def total(self) -> int:
         """The number of results of the check."""
-        return 0 if self.entry is None else sum(self.entry["counts"].values())
+        return sum(self.entry.get("counts", {}).values())
 
     @property
     def result(self) -> Mapping[str, Any]:
         """The worst result of the check."""
-        return {} if self.entry is None else self.entry["results"][0]
+        return self.entry["results"][0] if self.entry else {}
 
     @property
     def facts(self) -> Mapping[str, Any]:

@@ -293,7 +293,7 @@ def _number(lead: CheckedLadder) -> tuple[str, str, Floats] | None:
     """
     record = lead.record
     scheme, check = lead.scheme, lead.measured
-    if lead.entry is not None and check is not None and check.kind == "value":
+    if check is not None and check.kind == "value":
         values = field_values(record, lead.entry["id"], "value")[scheme]
         if finest_level.varies(values):
             name, alone = of_a_member(check, record.experiment.levels[-1])

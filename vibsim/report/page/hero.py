@@ -100,7 +100,7 @@ def _facts(record: Results) -> Iterator[str]:
 def numbers(lead: CheckedLadder) -> Iterator[Number]:
     """Yield the large numbers, the most informative first: decisive number, order, error, member, best value, steps."""
     record = lead.record
-    if lead.entry is not None and not lead.is_on_order:
+    if lead.entry and not lead.is_on_order:
         yield from _measured(lead)
     if record.triples or lead.is_on_order:
         yield from _order(lead)
@@ -184,7 +184,7 @@ def _order(lead: CheckedLadder) -> Iterator[Number]:
         yield {"label": label, "value": "exact", "note": "the levels differ by round-off only"}
     elif order is None or not math.isfinite(order):
         # a missing order is shown only if no other number decides
-        if lead.is_on_order or lead.entry is None:
+        if lead.is_on_order or not lead.entry:
             yield {"label": label, "value": "not measurable", "note": due}
     else:
         note = "; ".join(filter(None, [words.likely((low, high)), due + unasked]))
@@ -277,7 +277,7 @@ def pictures(lead: CheckedLadder) -> list[Picture]:
     has_response = max(values, default=1) >= sweep_layout.FEWEST_VALUES
     if has_response:
         left = drawn.response(lead)
-    elif lead.entry is not None and not lead.is_on_order:
+    elif lead.entry and not lead.is_on_order:
         left = _evidence(lead, drawn.LEFT)
     elif has_order:
         left = drawn.differences(lead)
@@ -295,7 +295,7 @@ def pictures(lead: CheckedLadder) -> list[Picture]:
 
 def _evidence(lead: CheckedLadder, width: float) -> Picture | None:
     """Return the picture of this width that shows why the decisive check came out as it did."""
-    if lead.entry is None:
+    if not lead.entry:
         return None
     found = figure.picture(lead)
     if found is None or found.figure is None:

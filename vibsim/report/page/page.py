@@ -110,7 +110,7 @@ def _checks(
 ) -> dict[str, Any]:
     """Return the section of checks; with `has_picture`, the first screen has the picture of the decisive check."""
     made = cards.cards(lead.record, summary)
-    decides = lead.entry["id"] if lead.entry else None
+    decides = lead.entry.get("id")
     if has_picture:
         made = [card | {"picture": None} if card["id"] == decides else card for card in made]
     alone, alike = cards.gathered(made, decides)

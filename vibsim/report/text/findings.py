@@ -104,7 +104,7 @@ BESIDE = " The estimate is within {part} % of the error against the {name} solut
 
 def title(lead: CheckedLadder, printed: Collection[str]) -> str:
     """Return the finding of an experiment in one line; `printed` are the ids of checks of printed numbers."""
-    if lead.entry is None:
+    if not lead.entry:
         return NO_CHECK
     entry, finding = lead.entry, _claim_title(lead) or _check_title(lead)
     if lead.status != "PASS":
@@ -124,7 +124,6 @@ def title(lead: CheckedLadder, printed: Collection[str]) -> str:
 
 def _share_of_runs(lead: CheckedLadder) -> str:
     """Say how many members or schemes have the verdict, by name if it is one scheme; empty if all have."""
-    assert lead.entry is not None
     count = lead.entry["counts"][lead.status]
     if not 0 < count < lead.total:
         return ""
@@ -168,7 +167,6 @@ def _caught(lead: CheckedLadder) -> str:
 
 def _check_title(lead: CheckedLadder) -> str:
     """Return the title of a page on the decisive check."""
-    assert lead.entry is not None
     status, reason = lead.status, lead.reason
     filled = _phrases(lead)
     if lead.is_on_order:
@@ -260,7 +258,6 @@ def short(model: Model, quantity: str) -> str:
 
 def _by(lead: CheckedLadder) -> str:
     """Name the scheme of a finding that is about one of several; empty where the subject names it, or for all."""
-    assert lead.entry is not None
     check, schemes = lead.measured, lead.schemes
     if lead.kind == "equal" or (check is not None and check.kind == "value" and check.at.scheme):
         return ""
@@ -316,7 +313,7 @@ def of_ladder(verdict: LadderVerdict) -> str:
 
 def factor(lead: CheckedLadder) -> float | None:
     """Return the factor by which halving the step divides the error; None without a settled order that decides."""
-    if lead.entry is None or not lead.is_on_order or lead.status == "INCONCLUSIVE":
+    if not lead.entry or not lead.is_on_order or lead.status == "INCONCLUSIVE":
         return None
     order = words.fact(lead.result, "order")
     is_settled = lead.result["reason"] in WITH_AN_ORDER and order is not None
@@ -326,7 +323,7 @@ def factor(lead: CheckedLadder) -> float | None:
 def paragraph(lead: CheckedLadder) -> str:
     """Return what the finding means, for a first-time reader."""
     record = lead.record
-    if lead.entry is None:
+    if not lead.entry:
         return NOTHING_ASKED.format(position=record.model.position)
     ratio, is_passed = factor(lead), lead.status == "PASS"
     if ratio is not None and is_passed and lead.result["reason"] == "asymptotic":
