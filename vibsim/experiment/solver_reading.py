@@ -91,9 +91,6 @@ def read_solver(source: Source, collection: str, file: Path) -> SolverExperiment
     return experiment
 
 
-# ---- sizes
-
-
 def _sizes(section: Any, report: Report) -> tuple[tuple[int, ...], dict[str, tuple[Any, ...]]]:
     """Return the values of `level` (empty without them), and the sizes of all levels by name."""
     if section is None:
@@ -148,9 +145,6 @@ def _by_formula(
     return tuple(map(int, values)) if is_whole else tuple(values)
 
 
-# ---- the sweep
-
-
 def _sweep(
     section: Any, written: Mapping[str, Any], report: Report
 ) -> tuple[Sweep | None, tuple[str, ...]]:
@@ -182,9 +176,6 @@ def _is_whole(raw: Any) -> bool:
         raw = raw.get("range")
     is_list = isinstance(raw, list)
     return is_list and all(isinstance(x, int) and not isinstance(x, bool) for x in raw)
-
-
-# ---- names and placeholders
 
 
 def _is_name(text: str) -> bool:
@@ -294,9 +285,6 @@ def _check_exact(
             variables = f" in {', '.join(known)}" if known else ", here without names"
             hint = error.hint or ("" if quantity.coordinates else "name its coordinates as well")
             report.add(path, f"must be a formula{variables} ({error.rule})", hint, quantity.exact)
-
-
-# ---- checks and files
 
 
 def _checks(document: Any, report: Report) -> tuple[SolverCheck, ...]:

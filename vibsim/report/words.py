@@ -42,8 +42,6 @@ LETTERS = {
 """Name to its Greek letter; other names stay as they are."""
 PARTS = {PHASE: ("φ({})", "phase error of {}"), AMPLITUDE: ("a({})", "amplitude error of {}")}
 """Suffix of a part of a position's error to its letter and its words."""
-
-
 _KEY = re.compile(r"\b(initial|model(?:\.parameters)?|schemes|time)\.(\w+)(?:\.(\w+))?")
 """A swept key: its section, and one or two names."""
 
@@ -181,8 +179,6 @@ MOST_DIGITS = 11  # longer mantissas are shortened
 PROSE = {"the", "phase", "amplitude", "value"} | {name.partition("_")[0] for name in VALUES}
 PROSE |= {text.partition(" ")[0] for text in (*VALUE_NAMES.values(), *IN_WORDS.values())}
 """First words of the names of numbers, one by one and of all members, and of parts of an error."""
-
-
 RAISE, LOWER = (str.maketrans("-0123456789", to) for to in ("⁻⁰¹²³⁴⁵⁶⁷⁸⁹", "₋₀₁₂₃₄₅₆₇₈₉"))
 """Digits to superscripts, and to subscripts."""
 

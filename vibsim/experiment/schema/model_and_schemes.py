@@ -131,8 +131,6 @@ def scheme_names(data: Any) -> Iterator[str]:
 
 
 MAX_DECLARED, MOST_TERMS = 50, 1000
-
-
 Declared = Annotated[dict[str, Number], short(MAX_DECLARED, "parameters")]
 _few = short(MOST, "formulas")
 

@@ -21,8 +21,6 @@ from vibsim.report.tables.table import Column, Table, csv_line
 LISTED = 10_000  # most rows of the table, and of a file with all digits of measured numbers
 DIGITS = 9  # significant digits of measured numbers in longer files
 ROWS_AT_A_TIME = 10_000  # in one formatting operation
-
-
 Field = tuple[Column, NDArray[Any]]  # a column and its values, shape (scheme, case)
 
 
