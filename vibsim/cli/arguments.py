@@ -111,38 +111,25 @@ def _flag(name: str, text: str) -> _Row:
     return (name,), {"action": "store_true", "help": text}
 
 
-RESULTS = _row(
-    "--results",
-    _path,
-    "DIR",
-    "results folder (default: results/ of the checkout, or where vibsim is installed ./results)",
+_WHERE = (
+    "results folder (default: results/ of the checkout, or where vibsim is installed ./results)"
 )
-SETTINGS = _row(
-    "--set",
-    _word,
-    "KEY=VALUE",
-    "replace a value of the file, such as model.g=1.62; may be repeated",
-    dest="settings",
-    action="append",
-    default=[],
-)
+_SET = "replace a value of the file, such as model.g=1.62; may be repeated"
+_TRUST = "run commands and functions that experiment files name (`solver:`); trust the files first"
+_CHANGED = "refuse to run unless the experiment and the code have this digest"
+_DISCARDED = "delete a damaged or outdated input, so that the next run makes it again"
+RESULTS = _row("--results", _path, "DIR", _WHERE)
+SETTINGS = _row("--set", _word, "KEY=VALUE", _SET, dest="settings", action="append", default=[])
 FILES = _row("experiments", _word, "FILE", _NAMES, nargs="+")
 CORES = _row("--cores", _positive, "N", "jobs at once (default: all cores)")
-ALLOW = _flag(
-    "--allow-commands",
-    "run commands and functions that experiment files name (`solver:`); trust the files first",
-)
+ALLOW = _flag("--allow-commands", _TRUST)
 THREADS = _row(
     "--threads", _positive, "N", "threads to use (default: 1); no number depends on it", default=1
 )
 ONE = _row("experiment", _word, "EXPERIMENT", "experiment or FILE.yaml")
 FOLDER = _row("--out", _path, "DIR", "folder to write to")
-_CHANGED = "refuse to run unless the experiment and the code have this digest"
-_DISCARDED = "delete a damaged or outdated input, so that the next run makes it again"
-JOB_OPTIONS = (
-    *(RESULTS, SETTINGS),
-    *(_row("--digest", _word, "SHA256", _CHANGED), _flag("--discard", _DISCARDED)),
-)
+DIGEST = _row("--digest", _word, "SHA256", _CHANGED)
+JOB_OPTIONS = (RESULTS, SETTINGS, DIGEST, _flag("--discard", _DISCARDED))
 """Options of every job of the workflow."""
 
 

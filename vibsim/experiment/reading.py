@@ -154,18 +154,14 @@ def build(
         checks=checks,
         scaling=numbers.scaling,
     )
-    kind = experiment.model.kind
-    if kind in report.kinds.own_models:
-        experiment.model.hold(report.kinds.own_models[kind])
+    if (own := report.kinds.own_models.get(experiment.model.kind)) is not None:
+        experiment.model.hold(own)
     experiment._file, experiment._settings = file, source.settings
     size_limits.check_costs(experiment, report)
     report.raise_any()
+    model = experiment.model.definition
     every = members.MemberNumbers(
-        experiment.model.definition,
-        numbers.parameters,
-        numbers.initial,
-        setting.time,
-        setting.sweep.axes,
+        model, numbers.parameters, numbers.initial, setting.time, setting.sweep.axes
     )
     unlikely.note_unlikely(document.checks, setting.levels, every, report)
     experiment._notes = report.note_lines

@@ -70,14 +70,8 @@ def _trace(figure: Any, film: Film, share: float) -> Callable[[int], None]:
     ax = figure.add_axes((0.09, 0.2 * share, 0.88, 0.62 * share))
     reference = next((run for run in film.runs if run.exact is not None), None)
     if reference is not None and reference.exact is not None:
-        ax.plot(
-            reference.t,
-            reference.exact,
-            color=PALE,
-            linewidth=5.0,
-            label=film.name_of_exact,
-            zorder=1,
-        )
+        pale: dict[str, Any] = {"color": PALE, "linewidth": 5.0, "zorder": 1}
+        ax.plot(reference.t, reference.exact, label=film.name_of_exact, **pale)
     for run, look in zip(film.runs, CURVES, strict=False):
         # with two drawings, the titles are below them
         label = "_" if len(film.scenes) > 1 else style.entry(run.title)
