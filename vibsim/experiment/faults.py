@@ -276,7 +276,6 @@ class Report:
 
 
 def _as_yaml(value: object) -> str:
-    """Return a value in YAML syntax."""
     if isinstance(value, dict):
         return "{" + ", ".join(f"{key}: {_as_yaml(inner)}" for key, inner in value.items()) + "}"
     if isinstance(value, list):

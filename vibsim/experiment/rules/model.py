@@ -104,7 +104,6 @@ def _note_unused(section: Any, formulas: Mapping[str, str], report: Report) -> N
 
 
 def _equation_of_structure(section: Any, model: Model, folder: Path, report: Report) -> Equation:
-    """Return the equation of a structure, with all its terms."""
     parameters = {
         row.key: float(getattr(section.rayleigh, row.name, row.default)) for row in RAYLEIGH
     }
@@ -122,7 +121,6 @@ def _equation_of_structure(section: Any, model: Model, folder: Path, report: Rep
 
 
 def _equation_of_formulas(section: Any, model: Model, folder: Path, report: Report) -> Equation:
-    """Return the equation of a model whose formulas are in the section."""
     reader = FormulaReader(section, model, report)
     reader.read(folder)
     declared, texts, tables = reader.declared, reader.texts, reader.tables

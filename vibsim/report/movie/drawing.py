@@ -163,7 +163,6 @@ def _outline(part: Part) -> Floats:
 
 
 def _legend(figure: Any, scene: Scene) -> None:
-    """Write the legend of a drawing's colours above the drawings."""
     from matplotlib.lines import Line2D
 
     handles = [

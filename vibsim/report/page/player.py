@@ -143,7 +143,6 @@ def _times(t: Floats, period: float, count: int) -> Floats:
 
 
 def _context(record: Results, shown: list[Lane]) -> dict[str, Any]:
-    """Return the content of the template."""
     t, period, position = shown[0].motion.t, shown[0].period, shown[0].motion.model.position
     whole = float(t[-1] - t[0])
     window = moments.window(whole, period)
@@ -223,7 +222,6 @@ def _still(lane: Lane) -> str:
 
 
 def _shape(part: Part, k: int) -> str:
-    """Return a part at the k-th time as an SVG element."""
     look = escape(part.look)
     if part.shape == "track":
         offset = float(np.ravel(part.at[0])[k])
@@ -232,7 +230,6 @@ def _shape(part: Part, k: int) -> str:
 
 
 def _label(part: Part) -> str:
-    """Return the label of a part at the first time as an SVG element."""
     place = scenes.place_of_label(part.shape, scenes.values_of(part, 0))
     at = ' display="none"' if place is None else f' x="{place[0]:.1f}" y="{place[1]:.1f}"'
     return f'<text class="{escape(part.look)}"{at}>{escape(part.label)}</text>'

@@ -73,7 +73,6 @@ def write(
 def _card(
     experiment: SolverExperiment, verdict: LadderVerdict, entry: Mapping[str, Any]
 ) -> dict[str, Any]:
-    """Return the card of a check."""
     files = [] if experiment.sweep else [f"level_{level:02d}.nc" for level in experiment.levels]
     card = study.card(entry["id"], verdict, entry["expected"], files)
     caption = card["table"].caption

@@ -102,7 +102,6 @@ def _best(verdict: LadderVerdict) -> str:
 
 
 def _expectation(verdict: LadderVerdict) -> str:
-    """Say which order is expected."""
     if verdict.expected is not None:
         return f"order {verdict.expected:g}"
     if verdict.at_least is not None:
@@ -140,7 +139,6 @@ def card(name: str, verdict: LadderVerdict, expected: str, files: Sequence[str])
 
 
 def _table(verdict: LadderVerdict) -> Table:
-    """Return the table of levels."""
     value = "value" if verdict.is_number else "norm"
     digits = digits_of_values(row.value for row in verdict.levels) if verdict.is_number else 4
     error = "error" if verdict.is_exact_known else "estimated error"
@@ -166,7 +164,6 @@ def _value(value: float | None, digits: int) -> Written | None:
 
 
 def _picture(name: str, verdict: LadderVerdict) -> Picture:
-    """Return the figure of a verdict with its caption."""
     expected = verdict.expected or verdict.at_least
     order = expected or verdict.order
     caption = ""

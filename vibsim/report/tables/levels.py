@@ -57,7 +57,6 @@ def _cells(values: Floats, kind: type[int] | type[float] = float) -> Fill:
 
 
 def _step_column(record: Results) -> tuple[Column, Fill]:
-    """Return the column of the time steps."""
     column = Column("dt", record.time_unit, "step")
     return column, lambda member, i: float(record.dt(member.case)[i])
 

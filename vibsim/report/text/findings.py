@@ -166,7 +166,6 @@ def _caught(lead: CheckedLadder) -> str:
 
 
 def _check_title(lead: CheckedLadder) -> str:
-    """Return the title of a page on the decisive check."""
     status, reason = lead.status, lead.reason
     filled = _phrases(lead)
     if lead.is_on_order:
