@@ -12,7 +12,6 @@ from vibsim.core.vocabulary import BY_TOLERANCE, REASONS, is_error_part, plain_n
 from vibsim.experiment.faults import Report
 from vibsim.experiment.rules import values
 from vibsim.experiment.rules.check_places import Scope
-from vibsim.experiment.rules.quantities import check_velocities, is_quantity, vectors_of
 from vibsim.experiment.rules.setting import Setting
 from vibsim.experiment.schema.checks import (
     SOLUTIONS,
@@ -103,8 +102,10 @@ def _check_quantity(
 
     It may also be one of `more`.
     """
-    if is_quantity(name, (*scope.setting.quantities, *more), scope.at(key)):
-        check_velocities(name, ((s, scope.at("schemes", i)) for i, s in enumerate(schemes or ())))
+    if values.is_quantity(name, (*scope.setting.quantities, *more), scope.at(key)):
+        values.check_velocities(
+            name, ((s, scope.at("schemes", i)) for i, s in enumerate(schemes or ()))
+        )
 
 
 def _check_converges(check: ConvergesCheck, scope: Scope) -> None:
@@ -133,7 +134,7 @@ def _check_convergent(name: str, key: str, schemes: Sequence[str] | None, scope:
     """Check that levels can be compared by the quantity under a key."""
     model = scope.setting.model
     if not is_error_part(name):
-        _check_quantity(name, key, schemes, scope, vectors_of(model))
+        _check_quantity(name, key, schemes, scope, values.vectors_of(model))
     elif model is not None and name not in error_parts(model):
         rule, hint = "unknown quantity", nearest(name, error_parts(model))
         if not has_error_parts(model):
@@ -187,7 +188,7 @@ def _check_value_check(check: ValueCheck, scope: Scope) -> None:
         _check_angle(check, scope)
     values.check_quantity_of(row, check.quantity, check.at.level == "best", scope)
     if check.quantity is not None and check.at.scheme is not None:
-        check_velocities(check.quantity, [(check.at.scheme, place.at("scheme"))])
+        values.check_velocities(check.quantity, [(check.at.scheme, place.at("scheme"))])
     place.check_place(check.at, row)
 
 
@@ -263,8 +264,8 @@ def _check_equal(check: EqualCheck, scope: Scope) -> None:
             choices += values.ENERGIES
             if plain_name(check.quantity) in choices and setting.own_velocity:
                 choices += (check.quantity,)
-    if is_quantity(check.quantity, choices, scope.at("quantity"), what):
-        check_velocities(check.quantity, named)
+    if values.is_quantity(check.quantity, choices, scope.at("quantity"), what):
+        values.check_velocities(check.quantity, named)
         if check.second == "exact" and setting.sweep.follow:
             values.refuse_followers(check.second, second)
         elif check.second == "exact":

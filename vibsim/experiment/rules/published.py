@@ -8,7 +8,6 @@ from typing import Any
 from vibsim.experiment.faults import Report
 from vibsim.experiment.rules import values
 from vibsim.experiment.rules.check_places import Scope
-from vibsim.experiment.rules.quantities import check_velocities
 from vibsim.experiment.rules.setting import Setting
 from vibsim.experiment.schema.published import row_at, row_id
 
@@ -54,4 +53,4 @@ def _check_table(table: Any, scope: Scope) -> None:
         else:
             place.check_scheme_and_case(row_at(printed))
         if table.quantity is not None:
-            check_velocities(table.quantity, [(printed.scheme, place.at("scheme"))])
+            values.check_velocities(table.quantity, [(printed.scheme, place.at("scheme"))])
