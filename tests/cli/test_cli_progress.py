@@ -14,7 +14,7 @@ from thinned import thinned
 from vibsim.cli.resources import amount, duration, size
 from vibsim.cli.run import lock, snakemake
 from vibsim.cli.run.executor import Executor
-from vibsim.cli.run.snakemake import Job, Outcome, Progress, follow
+from vibsim.cli.run.snakemake import Job, Outcome, Progress, Work, follow
 from vibsim.cli.run.snakemake_process import LogHandler, LogHandlerSettings
 
 EVENTS: list[tuple[str, LogEvent | None, dict[str, Any]]] = [
@@ -155,7 +155,7 @@ def test_a_broken_workflow_is_told_in_a_line(
     monkeypatch.setattr(snakemake, "home", lambda: root)
     held = lock.hold(tmp_path / "results")
     try:
-        ended = snakemake.run([], tmp_path / "results", held, Executor(["--cores", "1"]))
+        ended = snakemake.run(Work([], tmp_path / "results", held, Executor(["--cores", "1"])))
     finally:
         os.close(held)
     assert ended.status in (1, 2)
@@ -180,7 +180,7 @@ def test_options_behind_two_dashes_may_name_a_plug_in_of_a_local_run(
     held = lock.hold(tmp_path / "results")
     mine = Executor(["--cores", "1", "--logger", "vibsim", "mine"], is_extended=True)
     try:
-        ended = snakemake.run([], tmp_path / "results", held, mine)
+        ended = snakemake.run(Work([], tmp_path / "results", held, mine))
     finally:
         os.close(held)
     assert ended.status == 0, ended.text

@@ -15,9 +15,10 @@ from vibsim.cli.chosen_plans import plans_of, tell_notes
 from vibsim.cli.jobs.common import chosen_results, refusal
 from vibsim.cli.jobs.simulate import is_made
 from vibsim.cli.jobs.solve import check_allowed
+from vibsim.cli.outcome_text import Entry
 from vibsim.cli.run import changes, executor, junit, lock, outcome, reasons, snakemake
 from vibsim.cli.run.executor import Executor
-from vibsim.cli.run.snakemake import Job, Progress
+from vibsim.cli.run.snakemake import Job, Progress, Work
 from vibsim.core import private_cache
 from vibsim.core.errors import FileError, VibsimError
 from vibsim.core.temporary import temporary_folder
@@ -67,7 +68,7 @@ def _run(options: Namespace) -> int:
     progress = None if is_quiet else Progress()
     jobs: list[Job] = []
     for _ in range(_STAGES):
-        ended = _workflow(plans, results, lock_fd, target, progress)
+        ended = _workflow(Work(plans, results, lock_fd, target), progress)
         if ended.jobs:
             _refuse_edited(plans, options)
         summaries = [outcome.collect(plan, results) for plan in plans]
@@ -79,20 +80,27 @@ def _run(options: Namespace) -> int:
             results_folder.delete(error, results)
         if not _tell_deleted(results):
             break
-    return _show(options, plans, summaries, ended, results, bool(jobs))
+    _check(ended)
+    failures = outcome.failed_jobs(ended.failed, plans, results)
+    # Snakemake writes the index after all reports; after a failure it is written here, from the results that exist
+    index = ["report", "--results", str(results)]
+    has_index = not failures or supervise.child(index) == 0
+    status = _show(options, summaries, failures, results, bool(jobs))
+    if not (options.json or is_quiet):
+        # for many experiments, the index links to the reports
+        pages = [results / plan.page for plan in plans] if len(plans) <= _PAGES else []
+        for page in filter(Path.is_file, pages):
+            print(f"report: {page}")
+        if has_index:
+            print(f"all results: {results / 'index.html'}")
+    return 0 if status == "PASS" else 1
 
 
-def _workflow(
-    plans: Sequence[Plan],
-    results: Path,
-    lock_fd: int,
-    target: Executor,
-    progress: Progress | None = None,
-) -> snakemake.Outcome:
+def _workflow(work: Work, progress: Progress | None = None) -> snakemake.Outcome:
     """Run Snakemake; if it breaks on its own records, delete these, since the manifest suffices, and run it again."""
-    ended = snakemake.run(plans, results, lock_fd, target, progress)
-    if ended.broke and results_folder.forget(results):
-        return snakemake.run(plans, results, lock_fd, target, progress)
+    ended = snakemake.run(work, progress)
+    if ended.broke and results_folder.forget(work.results):
+        return snakemake.run(work, progress)
     return ended
 
 
@@ -141,17 +149,17 @@ def _dry_run(plans: Sequence[Plan], results: Path, target: Executor, options: Na
     with ExitStack() as stack:
         if not results.exists():
             results = stack.enter_context(temporary_folder())
-        lock_fd = lock.hold(results)
+        work = Work(plans, results, lock.hold(results), target)
         lock.claim(plans, results, dry_run=True)
         bad = changes.changed(plans, results, every=options.verify)
         for error in bad:
             print(f"vibsim: would be deleted and made again: {error}", file=sys.stderr)
         for path in changes.leftovers(plans, results):
             print(f"vibsim: would be removed, no longer asked for: {path}", file=sys.stderr)
-        ended = _preview(plans, results, lock_fd, target, bad)
+        ended = _preview(work, bad)
         outputs = {results / path for job in ended.jobs for path in job.outputs}
         if missed := [e for e in changes.stale(plans, results) if e.path not in outputs]:
-            ended = _preview(plans, results, lock_fd, target, [*bad, *missed])
+            ended = _preview(work, [*bad, *missed])
         jobs = list(_by_file(ended.jobs, plans, results))
         words = list(reasons.in_words(jobs, plans, results))
     if options.json:
@@ -164,15 +172,13 @@ def _dry_run(plans: Sequence[Plan], results: Path, target: Executor, options: Na
     return 0
 
 
-def _preview(
-    plans: Sequence[Plan], results: Path, lock_fd: int, target: Executor, bad: Sequence[FileError]
-) -> snakemake.Outcome:
+def _preview(work: Work, bad: Sequence[FileError]) -> snakemake.Outcome:
     """Ask Snakemake which jobs it would run if the files in `bad` were missing."""
-    arguments = [*target.arguments, "--dry-run"]
+    arguments = [*work.target.arguments, "--dry-run"]
     if bad:
-        paths = dict.fromkeys(error.path.relative_to(results).as_posix() for error in bad)
+        paths = dict.fromkeys(error.path.relative_to(work.results).as_posix() for error in bad)
         arguments += ["--forcerun", *paths]
-    ended = _workflow(plans, results, lock_fd, replace(target, arguments=arguments))
+    ended = _workflow(work._replace(target=replace(work.target, arguments=arguments)))
     _check(ended)
     return ended
 
@@ -196,18 +202,9 @@ def _check(ended: snakemake.Outcome) -> None:
 
 
 def _show(
-    options: Namespace,
-    plans: Sequence[Plan],
-    summaries: list[outcome_text.Entry],
-    ended: snakemake.Outcome,
-    results: Path,
-    worked: bool,
-) -> int:
-    _check(ended)
-    failures = outcome.failed_jobs(ended.failed, plans, results)
-    # Snakemake writes the index after all reports; after a failure it is written here, from the results that exist
-    index = ["report", "--results", str(results)]
-    has_index = not failures or supervise.child(index) == 0
+    options: Namespace, summaries: list[Entry], failures: list[Entry], results: Path, worked: bool
+) -> str:
+    """Show the outcome as the user wants it, and return its status."""
     status = outcome.status(summaries, failures)
     if options.junit:
         junit.write(options.junit, summaries, failures)
@@ -225,10 +222,4 @@ def _show(
         for line in outcome_text.of_failures(failures):
             print(line)
         print(f"\n{outcome_text.count(summaries, status)}")
-        # for many experiments, the index links to the reports
-        pages = [results / plan.page for plan in plans] if len(plans) <= _PAGES else []
-        for page in filter(Path.is_file, pages):
-            print(f"report: {page}")
-        if has_index:
-            print(f"all results: {results / 'index.html'}")
-    return 0 if status == "PASS" else 1
+    return status

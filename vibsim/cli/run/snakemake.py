@@ -15,7 +15,7 @@ from contextlib import ExitStack, suppress
 from dataclasses import dataclass, field
 from pathlib import Path
 from threading import Thread
-from typing import Any, BinaryIO
+from typing import Any, BinaryIO, NamedTuple
 
 from vibsim.cli import resources, results_folder, supervise
 from vibsim.cli.run import lock, pending
@@ -149,17 +149,21 @@ class Outcome:
         return cause
 
 
-def run(
-    plans: Sequence[Plan],
-    results: Path,
-    lock_fd: int,
-    target: Executor,
-    progress: Progress | None = None,
-) -> Outcome:
-    """Run Snakemake on `plans` and return when it has ended; it inherits the descriptor of the lock of `results`.
+class Work(NamedTuple):
+    """What Snakemake is asked to do."""
+
+    plans: Sequence[Plan]
+    results: Path
+    lock_fd: int  # descriptor of the lock of `results`, which Snakemake inherits
+    target: Executor
+
+
+def run(work: Work, progress: Progress | None = None) -> Outcome:
+    """Run Snakemake and return when it has ended.
 
     Raises Interrupted where SIGHUP, SIGINT or SIGTERM ended Snakemake, and VibsimError where another signal killed it.
     """
+    plans, results, lock_fd, target = work
     results_folder.clean(results, [plan.key for plan in plans])
     config = _write_config(plans, results, target)
     reading, writing = os.pipe()
