@@ -128,21 +128,25 @@ def test_text_of_a_solver_gives_a_terminal_no_orders() -> None:
 def test_colours_are_for_terminals_that_want_them(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.delenv("NO_COLOR", raising=False)
     monkeypatch.setenv("TERM", "xterm")
-    assert terminal.painted("FAIL", "FAIL", Terminal()) == "\033[31mFAIL\033[0m"
-    assert terminal.painted("FAIL", "FAIL", io.StringIO()) == "FAIL"
+    monkeypatch.setattr("sys.stdout", io.StringIO())
+    assert terminal.painted("FAIL", "FAIL") == "FAIL"
+    monkeypatch.setattr("sys.stdout", Terminal())
+    assert terminal.painted("FAIL", "FAIL") == "\033[31mFAIL\033[0m"
     monkeypatch.setenv("NO_COLOR", "1")
-    assert terminal.painted("FAIL", "FAIL", Terminal()) == "FAIL"
+    assert terminal.painted("FAIL", "FAIL") == "FAIL"
     # https://no-color.org: only a value that is not empty counts
     monkeypatch.setenv("NO_COLOR", "")
-    assert terminal.painted("FAIL", "FAIL", Terminal()) != "FAIL"
+    assert terminal.painted("FAIL", "FAIL") != "FAIL"
     monkeypatch.setenv("TERM", "dumb")
-    assert terminal.painted("FAIL", "FAIL", Terminal()) == "FAIL"
+    assert terminal.painted("FAIL", "FAIL") == "FAIL"
 
 
 def test_colours_do_not_shift_the_columns(monkeypatch: pytest.MonkeyPatch) -> None:
     rows = [entry(check()), entry(check("two", "FAIL"), check("long name"), name="longer")]
     plain = [*outcome_text.in_lines(rows, 90), *outcome_text.in_full(rows, 90)]
-    monkeypatch.setattr(terminal, "has_colours", lambda _: True)
+    monkeypatch.delenv("NO_COLOR", raising=False)
+    monkeypatch.setenv("TERM", "xterm")
+    monkeypatch.setattr("sys.stdout", Terminal())
     coloured = [*outcome_text.in_lines(rows, 90), *outcome_text.in_full(rows, 90)]
     assert coloured != plain
     bare = [line.replace("\033[0m", "") for line in coloured]
