@@ -56,8 +56,11 @@ def extremum_of_levels(
     """
     noise = ORDER_ABOVE_ROUND_OFF * floor[..., -1]
     rise = _rise_after_start(name, place, over_points[..., -1], noise)
-    error = _error_over_points(place, over_points, noise, size, rise)
     series = _upward(name, place)
+    is_apart, reach = _beside_impacts(series, place)
+    error = _error_over_points(place, over_points, noise, size, (rise == 0.0) & is_apart)
+    # without a frequency the motion between points is known by its largest change from one to the next
+    error = np.where(np.isnan(error) & _is_struck(place.block), reach, error)
     smooth, error_smooth = _between_points(name, series, over_points)
     # all levels may miss a crest in the first step
     is_missed = np.abs(smooth[..., -1] - over_points[..., -1]) <= noise
@@ -107,19 +110,39 @@ def _rise_after_start(
         return np.where(at_start & (outward > 0.0), 0.5 * place.block.grid.dt[-1] * outward, 0.0)
 
 
+def _beside_impacts(series: Series, place: value_numbers.Place) -> tuple[Flags, Floats]:
+    """Mark extrema that no motion from a sample beside an impact reaches, and return the largest change in a step.
+
+    Shapes (scheme, case). Without a series none is marked, and the change is infinite.
+    """
+    record, finest = place.block.finest, len(place.levels) - 1
+    is_smooth = ~_is_struck(place.block)
+    if finest not in series or "event_time" not in record:
+        return is_smooth, np.full(place.block.shape, np.inf)
+    times = np.asarray(record["event_time"])
+    rows = series[finest].reshape(*times.shape[:-1], -1)
+    where = times / place.block.group.end[:, None] * (rows.shape[-1] - 1)
+    before = np.clip(np.nan_to_num(where), 0, rows.shape[-1] - 2).astype(np.int64)
+    beside = np.maximum(*(np.take_along_axis(rows, before + k, -1) for k in (0, 1)))
+    beside = np.max(np.where(np.isnan(times), -np.inf, beside), axis=-1, initial=-np.inf)
+    is_whole = np.asarray(record["event_count"]) <= times.shape[-1]
+    reach = np.max(np.abs(np.diff(rows, axis=-1)), axis=-1)
+    return is_smooth | (is_whole & (beside + reach < np.max(rows, axis=-1))), reach
+
+
 def _error_over_points(
-    place: value_numbers.Place, values: Floats, noise: Floats, size: Floats, rise: Floats
+    place: value_numbers.Place, values: Floats, noise: Floats, size: Floats, may_be_whole: Flags
 ) -> Floats:
     """Return a bound of how much grid points miss of an extremum: ``w^2 dt^2/8`` of its size.
 
     If impacts change a velocity, a state turns abruptly, and the bound is ``w dt``. The missed part varies irregularly
-    between levels, so extrapolation cannot remove it. Nothing is missed if the levels have the same value, unless that
-    is a start beyond which the position moves by `rise`.
+    between levels, so extrapolation cannot remove it. Nothing is missed if the levels have the same value where it
+    `may_be_whole`: not at a start beyond which the position moves, nor near an impact, beside which they share a point.
     """
     w_dt = np.minimum(place.block.omega_dt[:, -1], 1.0)
     changes = np.abs(np.diff(values[..., -3:], axis=-1))
     with np.errstate(invalid="ignore"):
-        is_constant = np.all(changes <= noise[..., None], axis=-1) & (rise == 0.0)
+        is_constant = np.all(changes <= noise[..., None], axis=-1) & may_be_whole
     missed_share = np.where(_is_struck(place.block), w_dt, ERROR_OF_LINE * w_dt**2)
     return np.where(is_constant, 0.0, missed_share * size)
 

@@ -356,3 +356,28 @@ def test_a_large_sweep_keeps_the_times_that_checks_ask_for(monkeypatch: pytest.M
     levels = [simulate(made, level) for level in made.levels]
     assert levels[0].sizes["event"] == 2
     assert verdicts(made, analyse(made, levels))[0].status == "PASS"
+
+
+def test_levels_that_share_the_point_beside_an_impact_do_not_bound_an_extremum() -> None:
+    """A ball falls from 1, exactly: its lowest point is 0, but every level has the same point, above it."""
+    ball = {
+        "kind": "system",
+        "coordinates": ["x", "y"],
+        "acceleration": {"x": 0, "y": "-g"},
+        "parameters": {"g": 1.0},
+        "events": [{"when": "y", "falling": True, "then": {"vy": "-0.9*vy"}}],
+    }
+    experiment = Experiment.from_dict(
+        {
+            **{"title": "x", "model": ball, "initial": {"x": 0, "vx": 1, "y": 0.5, "vy": 0.7}},
+            "time": {"end": math.sqrt(1.49) + 0.7 + 0.001, "base_steps": 1},
+            **{"levels": [4, 5, 6, 7], "schemes": ["rk4"]},
+            "checks": [
+                {"value": "min", "quantity": "y", "at": {"level": "best"}, "above": 1e-6},
+                {"value": "max", "quantity": "y", "at": {"level": "best"}, "equals": 0.745},
+            ],
+        }
+    )
+    lowest, highest = decided(experiment)
+    assert lowest.status == "INCONCLUSIVE"
+    assert highest.status == "PASS"
