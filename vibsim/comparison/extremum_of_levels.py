@@ -116,7 +116,9 @@ def _beside_impacts(series: Series, place: value_numbers.Place) -> tuple[Flags, 
     Shapes (scheme, case). Without a series none is marked, and the change is infinite.
     """
     record, finest = place.block.finest, len(place.levels) - 1
-    is_smooth = ~_is_struck(place.block)
+    events, velocities = place.block.model.events, place.block.model.velocities
+    # a motion that ends stays where it ends, which points see
+    is_smooth = ~(_is_struck(place.block) & bool(events and events.changed(velocities)))
     if finest not in series or "event_time" not in record:
         return is_smooth, np.full(place.block.shape, np.inf)
     times = np.asarray(record["event_time"])

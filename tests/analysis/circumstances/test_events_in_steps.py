@@ -381,3 +381,23 @@ def test_levels_that_share_the_point_beside_an_impact_do_not_bound_an_extremum()
     lowest, highest = decided(experiment)
     assert lowest.status == "INCONCLUSIVE"
     assert highest.status == "PASS"
+
+
+def test_a_motion_that_ends_has_its_lowest_point_at_its_end() -> None:
+    thrown = {
+        "kind": "system",
+        "coordinates": ["x", "y"],
+        "acceleration": {"x": 0, "y": -1},
+        "stop": "y < -x/2",
+    }
+    experiment = Experiment.from_dict(
+        {
+            **{"title": "x", "model": thrown, "initial": {"vx": 1, "vy": 2}, "time": {"end": 6}},
+            **{"levels": [3, 4, 5, 6], "schemes": ["rk4"]},
+            "checks": [
+                {"value": "min", "quantity": "y", "at": {"level": "best"}, "below": -2.4999999},
+                {"value": "max", "quantity": "y", "at": {"level": "best"}, "above": 1.9999999},
+            ],
+        }
+    )
+    assert [verdict.status for verdict in decided(experiment)] == ["PASS", "PASS"]
