@@ -39,7 +39,7 @@ def options_swept(experiment: Experiment) -> bool:
 def depends_on_beginning(experiment: Experiment) -> bool:
     """Tell whether the order of some scheme depends on how the motion begins: from rest or from balance."""
     model = experiment.model.definition
-    if model.is_broken or model.lookup is not None or depends_on_velocity(model):
+    if model.events_act or model.lookup is not None or depends_on_velocity(model):
         return False
     if experiment.chain > 1:
         # a member that starts from the end of another one begins in an unknown way
@@ -176,7 +176,7 @@ def special_orders(experiment: Experiment, quantity: str, columns: Columns) -> F
         return np.full((len(experiment.schemes), 1), np.inf)
 
     def special(scheme: Scheme, options: Options) -> float:
-        has_mesh = model.is_broken and is_on_the_mesh(options)
+        has_mesh = model.events_act and is_on_the_mesh(options)
         return math.nan if has_mesh else scheme.special_order(options)
 
     return by_options(experiment, columns, special)
@@ -203,7 +203,7 @@ def orders_on_oscillator(experiment: Experiment, quantity: str, columns: Columns
 
 def orders_vary(experiment: Experiment, quantity: str) -> bool:
     """Tell whether the orders of a quantity may differ between members."""
-    if is_promised(experiment, quantity) or experiment.model.definition.is_broken:
+    if is_promised(experiment, quantity) or experiment.model.definition.events_act:
         return experiment.sweep is not None
     return options_swept(experiment) or beginning_varies(experiment)
 
@@ -225,13 +225,13 @@ def left_to_the_mesh(experiment: Experiment, columns: Columns, has_corners: Flag
     model = experiment.model.definition
 
     def left(scheme: Scheme, options: Options) -> float:
-        if model.is_broken:
+        if model.events_act:
             return 1.0 if is_on_the_mesh(options) else math.nan
         # the error of a first-order scheme dominates that of the corners
         order = scheme.formal_order(model.position, model, options)
         return ORDER_AT_CORNERS if order >= ORDER_AT_CORNERS else math.nan
 
-    if model.is_broken:
+    if model.events_act:
         return by_options(experiment, columns, left)
     if not has_corners.any():
         return np.full((len(experiment.schemes), 1), np.nan)

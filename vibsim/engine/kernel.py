@@ -196,7 +196,7 @@ def _settings(
         "STAGED": bool(stages(stepper.step)),
         "EVENTS": model.events is not None,
         "LOCATED": stepper.events != "mesh",
-        "ACT": model.is_broken,
+        "ACT": model.events_act,
         "PARAMETERS": parameters,
         **block_loop.row_places(states, parameters, with_peaks),
         **gather.sample_rows(count),

@@ -211,7 +211,7 @@ class Model:
     """Whether the motion is a sum of linear, conservative motions; the energy then has their orders."""
 
     @property
-    def is_broken(self) -> bool:
+    def events_act(self) -> bool:
         """Whether events change the motion."""
         return self.events is not None and self.events.act
 
@@ -316,7 +316,7 @@ def has_solution(model: Model) -> bool:
     The motion of a structure is known only by its modes. The reference solution of a single member may fail
     (`vibsim.simulation.reference.solve`): its values are then NaN.
     """
-    return model.exact is not None or not (model.is_broken or model.loaded is not None)
+    return model.exact is not None or not (model.events_act or model.loaded is not None)
 
 
 def varies_in_time(model: Model) -> bool:
@@ -391,7 +391,7 @@ def has_error_parts(model: Model) -> bool:
 
     That requires a smooth motion, and its accelerations, which are not kept for a structure.
     """
-    return not model.is_broken and model.lookup is None and model.loaded is None
+    return not model.events_act and model.lookup is None and model.loaded is None
 
 
 def error_parts(model: Model) -> tuple[str, ...]:

@@ -87,7 +87,7 @@ class MemberBlock:
             stored_or_nan(self.finest, name, self.shape[1:])
             for name in ("natural_frequency", "exact_period")
         )
-        least = np.nan if self.model.is_broken else 1.0
+        least = np.nan if self.model.events_act else 1.0
         own = np.fmax(2.0 * np.pi / period * self.group.end, least)
         return np.where(np.isnan(w), own, w * self.group.end)
 
@@ -172,7 +172,7 @@ class MemberBlock:
 
     def safety(self, irregular: float) -> Floats:
         """Return the factor on bounds from levels, shape (c,): `irregular` if events or tables divide steps."""
-        has_places = self.corners.of_tables | self.model.is_broken
+        has_places = self.corners.of_tables | self.model.events_act
         return np.where(has_places, irregular, 1.0)
 
     def unseen_at_corner(self, size: Floats) -> Floats:

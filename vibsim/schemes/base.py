@@ -296,7 +296,7 @@ class Scheme:
         inside a step limits it to 2 (`ORDER_AT_CORNERS`). A motion that meets no event is smooth.
         """
         quantity, orders = components(model, quantity)[0], self.orders(options)
-        if not (model.is_broken and meets_events):
+        if not (model.events_act and meets_events):
             order = orders.of(quantity, model, beginning)
             # the power of the force has corners, wherever steps end; the power of damping has none
             is_kept = self._resolves_corners(model) and quantity not in BUDGET[1:]

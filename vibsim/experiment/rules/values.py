@@ -104,7 +104,7 @@ def instead_of_energy(scope: Scope) -> str:
     budget = "the budget of energy and work is: `converges: energy_budget`"
     has_budget = "energy_budget" in scope.setting.quantities
     model = scope.setting.model
-    if has_budget and model is not None and model.is_broken:
+    if has_budget and model is not None and model.events_act:
         return f"its events may change it; {budget}"
     if model is not None and model.misses_potential:
         return "write its `potential`, if the forces have one that vibsim does not find"
