@@ -120,11 +120,14 @@ def keep_for_verdicts(
     # a claim reads the variables of the check that decides it
     measured = [check.measured for check in experiment.checks]
     quantities = [check.converges for check in measured if check.kind == "converges"]
+    # whether the levels approach another solution, beside which no best value has a bound
+    model = experiment.model.definition
+    numbers = [check.quantity or model.position for check in measured if check.kind == "value"]
     suffixes = ("observed_order", "formal_order", "coincidence")
     of_orders = {f"{quantity}_{suffix}" for quantity in quantities for suffix in suffixes}
+    of_orders |= {f"{quantity}_reason" for quantity in numbers}
     if quantities:
         # of a vector of low order, the coordinate with the largest share is named
-        model = experiment.model.definition
         vectors = (components(model, quantity) for quantity in quantities)
         of_orders |= {
             f"{name}_difference_norm" for names in vectors if len(names) > 1 for name in names
