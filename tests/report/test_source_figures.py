@@ -9,13 +9,14 @@ import numpy as np
 import pytest
 import samples
 import yaml
+from markupsafe import Markup
 
 from vibsim import report
 from vibsim.experiment import Experiment
 from vibsim.experiment.schema.figures import KINDS
 from vibsim.report import choice, style
 from vibsim.report.figures import accuracy, of_source
-from vibsim.report.page import player, sources
+from vibsim.report.page import page_figures, player, sources
 
 ROOT = Path(__file__).parents[2]
 CONFIGS = ROOT / "configs"
@@ -350,3 +351,19 @@ def test_a_poincare_section_is_left_out_without_samples_of_every_period(every: i
     )  # fmt: skip
     ((_, pictures),), _ = drawn(exp)
     assert not pictures
+
+
+def test_a_picture_that_the_source_explains_is_not_explained_again() -> None:
+    def shown(title: str, caption: str) -> page_figures.Shown:
+        return style.Picture(title, title, caption, "", None), Markup("")
+
+    above = [shown("lecture, section 2.5: Do the levels agree? u", "long")]
+    below = [
+        shown("Do the levels agree? v", "as long"),
+        shown("Phase plane", "other"),
+        shown("Steps", ""),
+    ]
+    assert page_figures._captions(below, above) == [
+        ("Do the levels agree?", page_figures.SEEN),
+        ("Phase plane", "other"),
+    ]

@@ -15,6 +15,7 @@ from vibsim.report.page.templates import markup
 from vibsim.report.style import Picture
 
 BYTES = 1_000_000  # most bytes of all figures under tabs; further figures are files only
+SEEN = "See the same picture under Figures of the source."  # in place of a caption given there
 FIGURES = 6  # most figures under the tabs of a section
 
 Shown = tuple[Picture, str]  # a picture with its markup
@@ -49,7 +50,7 @@ def draw(
         "figures": groups | {"belief": belief, "members": over_members},
         "reading": {name: _captions(group) for name, group in groups.items()}
         | {"source": _readings(picture for picture, _ in groups["source"])}
-        | {"belief": _captions(one for _, group in belief for one in group)}
+        | {"belief": _captions((one for _, group in belief for one in group), groups["source"])}
         | {"members": _readings(view.picture for view in views)},
         "members": explorer.content(record, views),
         "worst": explorer.worst(record, views),
@@ -93,16 +94,21 @@ class _Drawn:
         return found
 
 
-def _captions(drawn: Iterable[Shown]) -> list[tuple[str, str]]:
+def _captions(drawn: Iterable[Shown], above: Iterable[Shown] = ()) -> list[tuple[str, str]]:
     """Return each kind of picture once, named by its title up to the first colon, with its caption.
 
-    A caption that several kinds share appears only once.
+    A caption that several kinds share appears only once, and a kind that is explained `above` refers to that.
     """
     found: dict[str, Picture] = {}
     for picture, _ in drawn:
         kind, question, _ = picture.title.partition(":")[0].partition("?")
         found.setdefault(kind + question, picture)
-    return _readings(replace(picture, title=kind) for kind, picture in found.items())
+    # the title of a figure of the source begins with the place in the source
+    known = [picture.title.partition(": ")[2] for picture, _ in above]
+    for kind, picture in found.items():
+        is_known = picture.caption and any(title.startswith(kind) for title in known)
+        found[kind] = replace(picture, title=kind, caption=SEEN if is_known else picture.caption)
+    return _readings(found.values())
 
 
 def _readings(pictures: Iterable[Picture]) -> list[tuple[str, str]]:
