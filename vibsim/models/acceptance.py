@@ -77,13 +77,12 @@ def _fault_of_force(model: Model) -> str:
     if not model.linear:
         return ""
     if not model.is_alone:
-        return "its linear says True, which is for one coordinate: write linear=False"
-    if is_linear(
-        tree(model, model.acceleration), model.position, (*model.positions, *model.velocities, "t")
-    ):
+        return f"it says linear=True, but has {model.coordinates} coordinates: write linear=False"
+    states = [state.name for state in model.states]
+    if is_linear(tree(model, model.acceleration), model.position, (*states, "t")):
         return ""
     return (
-        f"its linear says True, but its acceleration is not linear in {model.position} with a constant coefficient: "
+        f"it says linear=True, but its acceleration is not linear in {model.position} with a constant coefficient: "
         "write linear=False"
     )
 
@@ -105,7 +104,7 @@ def _fault_of_energy(model: Model) -> str:
     if claims_powers:
         return "its energies do not change by driving less dissipation along its motion: one of these formulas is wrong"
     return (
-        "its conservative says True, but by its acceleration kinetic_energy + potential_energy changes: correct one "
+        "it says conservative=True, but with its acceleration kinetic_energy + potential_energy changes: correct one "
         "of them, or write conservative=False"
     )
 
