@@ -320,7 +320,7 @@ DAMPED = {"acceleration": "-w**2*u - 0.1*v", "conservative": False}
         ({"acceleration": "-w**2*u**3", "conservative": False}, "not linear in u"),
         ({"acceleration": "-w**2*u*sign(u - 2)", "conservative": False}, "not linear in u"),
         ({"acceleration": "-w**2*u*1.001"}, "kinetic_energy + potential_energy changes"),
-        ({**DAMPED, "dissipation": "0.11*v**2"}, "driving less dissipation"),
+        ({**DAMPED, "dissipation": "0.11*v**2"}, "driving minus dissipation"),
         ({**DAMPED, "dissipation": "0.1*v**2"}, ""),
         (DAMPED, ""),
         # no formula can be worked out for states near 1

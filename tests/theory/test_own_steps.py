@@ -255,3 +255,15 @@ def test_a_step_that_has_no_meaning_for_vectors_is_refused_with_the_name_of_its_
     )
     with pytest.raises(SimulationError, match="scheme step_by_direction: its step fails: "):
         simulate(experiment, level)
+
+
+def test_a_step_with_a_root_1_of_higher_multiplicity_has_no_series():
+    def start(variant, u, v, dt, p, acceleration):
+        return u + dt * v, v, u, u - dt * v
+
+    def step(state, t, dt, p, acceleration):
+        u, v, before, first = state
+        return (3.0 * u - 3.0 * before + first, v, u, before), v
+
+    with pytest.raises(theory.NoSeriesError, match="does not tend to w"):
+        theory.part_orders(Stepper(start, step), 0.0, 1.0, 0.0)

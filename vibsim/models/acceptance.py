@@ -102,7 +102,7 @@ def _fault_of_energy(model: Model) -> str:
     if zeros([*energies, lost, Negate(given)], states, {"t": NEAR_ONE, **ends}).all():
         return ""
     if claims_powers:
-        return "its energies do not change by driving less dissipation along its motion: one of these formulas is wrong"
+        return "along its motion the energy does not change by driving minus dissipation: one of them is wrong"
     return (
         "it says conservative=True, but with its acceleration kinetic_energy + potential_energy changes: correct one "
         "of them, or write conservative=False"

@@ -159,11 +159,20 @@ def where_it_ends(
 @lru_cache(maxsize=4096)
 def _ends(stepper: Stepper, p: float) -> bool:
     """Tell whether no function of a scheme makes too many comparisons of floats at ``w dt = p``."""
+    return not _compares(stepper, p, MOST_COMPARISONS)
+
+
+def _compares(stepper: Stepper, p: float, most: int, substitutes: Substitutes = _NONE) -> bool:
+    """Tell whether a function of a scheme makes more than so many comparisons of floats at ``w dt = p``."""
+
+    def read(formula: str) -> Plain:
+        return Plain(float(decimal(formula)))
+
     try:
-        unit_steps(stepper, Plain(p), Plain(0.0), lambda formula: Plain(float(decimal(formula))))
+        unit_steps(stepper, Plain(p), Plain(0.0), read, substitutes=substitutes, most=most)
     except EndlessStepError:
-        return False
-    return True
+        return True
+    return False
 
 
 @lru_cache(maxsize=256)
@@ -172,14 +181,8 @@ def require_formula(stepper: Stepper) -> None:
 
     The equation of an implicit step does not count: on a linear problem it has a formula as its solution.
     """
-
-    def read(formula: str) -> Plain:
-        return Plain(float(decimal(formula)))
-
-    try:
-        unit_steps(stepper, Plain(SMALL), Plain(0.0), read, substitutes=LINEAR, most=0)
-    except EndlessStepError:
-        raise NoSeriesError("the step compares numbers, so that it is not one formula") from None
+    if _compares(stepper, SMALL, 0, LINEAR):
+        raise NoSeriesError("the step compares numbers, so that it is not one formula")
 
 
 def _solved(

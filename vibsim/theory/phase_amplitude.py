@@ -90,7 +90,7 @@ def principal(stepper: Stepper, damping: float, known: int) -> Principal:
     exact = coefficients(stepper)
     half = Fraction(repr(damping)) / 2
     for domain, elements in (exact, in_reals(*exact)):
-        with suppress(ValueError):
+        with suppress(ValueError, ZeroDivisionError):
             step = _principal(stepper, damping, Field(domain, known), elements)
             if (step.square.shifted(-2) - (1 - half * half)).vanishes:
                 return step
@@ -104,7 +104,7 @@ def _principal(
 
     The quadratic factor is ``(x - 1)^2`` at h = 0, where the quotient has no root 1 if the scheme converges. So it
     exists and is unique (Hensel's lemma), and Bairstow's method doubles the number of correct powers. Raises ValueError
-    if there is none, as with rounded coefficients in exact numbers.
+    if there is none, as with rounded coefficients in exact numbers, and ZeroDivisionError if there are several.
     """
     zero, h = field.constant(0.0), field.series(field.domain.one, 1)
     units = unit_steps(
