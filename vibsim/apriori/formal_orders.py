@@ -21,7 +21,7 @@ from vibsim.experiment.sweep_columns import Columns, by_options, option_groups, 
 from vibsim.formula import values
 from vibsim.models.base import by_name, components, tree
 from vibsim.models.shared.free import free_oscillation, why_not_free
-from vibsim.schemes import SCHEMES, Options, Scheme
+from vibsim.schemes import FIXED_STEP, Options, Scheme
 from vibsim.schemes.base import ORDER_AT_CORNERS, is_on_the_mesh
 from vibsim.schemes.orders import Beginning, depends_on_velocity, is_autonomous
 from vibsim.simulation.members import numbers_of
@@ -194,7 +194,7 @@ def orders_on_oscillator(experiment: Experiment, quantity: str, columns: Columns
         return np.full((len(experiment.schemes), 1), np.inf)
 
     def on_oscillator(scheme: Scheme, options: Options) -> float:
-        if scheme.adaptive or SCHEMES.has_built_in(scheme):
+        if scheme.adaptive or FIXED_STEP.get(scheme.kind) is scheme:
             return math.inf
         return theory.orders(scheme.stepper(options))[int(of_which in model.velocities)]
 

@@ -61,10 +61,6 @@ class Registry(Mapping[str, Entry]):
     def __contains__(self, kind: object) -> bool:
         return kind in self.built_in or kind in self._offers()
 
-    def has_built_in(self, entry: Entry) -> bool:
-        """Tell whether an entry comes with vibsim, and not from a user."""
-        return self.built_in.get(entry.kind) is entry
-
     def own(self, entries: Iterable[Any]) -> dict[str, Entry]:
         """Return a user's own models or schemes by kind, after checking them.
 

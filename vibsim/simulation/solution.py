@@ -59,7 +59,7 @@ def solve(
                         model, method, options, *numbers, steps, every, **more
                     )
                 except (SimulationError, TypeError, ValueError) as error:
-                    if SCHEMES.has_built_in(method):
+                    if SCHEMES.built_in.get(method.kind) is method:
                         raise
                     raise SimulationError(
                         f"scheme {scheme.name}: its step fails: {error}"
